@@ -101,4 +101,6 @@ pub enum Quantity {
     Values,
     /// Normals and curvatures in this dimension.
     Geometry,
+    /// Regions of a tile.
+    Regions,
 }

@@ -12,7 +12,7 @@ mod curvature;
 mod orientation;
 mod request;
 
-use super::error::NumericsError;
+use super::error::{NumericsError, Quantity, SolverKind};
 use super::function::interpolant::Interpolant;
 use super::observer::Observer;
 use crate::machine::vector::dot;
@@ -47,6 +47,24 @@ impl Surface {
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
         Ok(SignatureSurface::of(signature, given, observer)?.into())
+    }
+
+    /// Finds the regions of a tile; see [`LocalSurface::regions`].
+    ///
+    /// # Errors
+    /// Returns the errors of that, and [`NumericsError::Unsupported`] for a signature function.
+    pub fn regions(
+        &self,
+        tile: &tiles::Tile<'_>,
+        directions: &Cloud,
+        observer: &dyn Observer,
+    ) -> Result<tiles::LabelledRegions, NumericsError> {
+        match self {
+            Self::Local(surface) => surface.regions(tile, directions, observer),
+            Self::Signature(_) => {
+                Err(NumericsError::Unsupported { solver: SolverKind::Dense, quantity: Quantity::Regions })
+            }
+        }
     }
 
     pub fn cloud(&self) -> &Cloud {

@@ -6,7 +6,7 @@ use crate::machine::price::{Price, Sizes};
 use crate::patches::MAX_LOCAL_DIMENSION;
 use crate::patches::price::{choosing_flops, regression_flops};
 use crate::points::quadric::{n_coefficients, n_quadric_neighbours};
-use crate::points::sampling::sampling_flops;
+use crate::points::sampling::{sampling_flops, sampling_price};
 use crate::points::thinning::n_coarse;
 use crate::solver::price::FactorPrice;
 use crate::sums::price::pair_flops;
@@ -91,6 +91,20 @@ pub(crate) fn geometry_price(asked: AskedOfSurface, sizes: Sizes) -> Price {
     let at_queries = n_queries.saturating_mul(numbers_at_query(dimension));
     let n_numbers = (4 * n_points).saturating_add(at_queries).saturating_add(deviation_numbers(asked, sizes));
     Price::of_numbers(n_numbers, geometry_flops(asked, sizes))
+}
+
+/// The price of the regions of a tile, each point of which may be a region of its own: its normal, its
+/// edges, and the sums over it.
+pub fn regions_price(n_points: usize, dimension: usize) -> Price {
+    let edges = 4 * (2 * dimension + 2);
+    Price::of_numbers(n_points.saturating_mul(12 + 6 * dimension + edges), 1e3 * n_points as f64)
+}
+
+/// The price of choosing a coarse part of a cloud, with its kernel.
+pub fn coarse_price(n_points: usize, dimension: usize) -> Price {
+    let halvings = (n_points as f64).log2().max(1.0) * (n_points * dimension) as f64;
+    let of_coarse = sampling_price(n_coarse(n_points), dimension);
+    Price::of_numbers(n_points, 8.0 * halvings).and(of_coarse)
 }
 
 /// The price of normals and curvatures by local regressions at queries.

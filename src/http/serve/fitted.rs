@@ -41,6 +41,14 @@ impl Fits {
         self.surface.as_ref().unwrap_or(&self.main)
     }
 
+    /// Returns the surface of an operation that needs one.
+    ///
+    /// # Errors
+    /// 500 `internal` for an operation that said it needs none. That is a bug.
+    pub fn made_surface(&self) -> Result<&Arc<Surface>, Problem> {
+        self.made.as_ref().ok_or_else(Problem::internal)
+    }
+
     /// Returns the function with these values.
     ///
     /// # Errors

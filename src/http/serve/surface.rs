@@ -48,7 +48,7 @@ impl Fits {
         observer: &JobObserver,
     ) -> Result<SurfaceGeometry, Problem> {
         let fitted = self.surface();
-        let surface = self.made.clone().ok_or_else(Problem::internal)?;
+        let surface = self.made_surface()?.clone();
         let geometry =
             Geometry::of(&surface, queries, request, observer).map_err(|error| fitted.refused(error))?;
         Ok(SurfaceGeometry { surface, geometry, stencils: None, request: *request })

@@ -105,6 +105,23 @@ impl Planner<'_> {
         }
     }
 
+    /// Validates points that are used once, at this pointer.
+    ///
+    /// # Errors
+    /// 413 beyond the limits, 422 for an invalid cloud.
+    pub fn unregistered(&self, points: Points, pointer: &str) -> Result<Cloud, Problem> {
+        let cloud = rectangular(points, pointer, Slug::InvalidCloud)?;
+        let (limit, required) = (self.app.config.max_points, cloud.n_points());
+        if required > limit {
+            return Err(too_many_points(limit, required).at(pointer));
+        }
+        let (limit, required) = (self.app.config.max_dimension, cloud.dimension());
+        if required > limit {
+            return Err(too_many_coordinates(limit, required, cloud.n_points()).at(pointer));
+        }
+        Ok(cloud)
+    }
+
     /// Validates and registers points. Returns whether they are new.
     ///
     /// # Errors
@@ -115,16 +132,7 @@ impl Planner<'_> {
         normals: Option<Points>,
         pointer: &str,
     ) -> Result<(Arc<RegisteredCloud>, bool), Problem> {
-        let at = format!("{pointer}/points");
-        let cloud = rectangular(points, &at, Slug::InvalidCloud)?;
-        let (limit, required) = (self.app.config.max_points, cloud.n_points());
-        if required > limit {
-            return Err(too_many_points(limit, required).at(at));
-        }
-        let (limit, required) = (self.app.config.max_dimension, cloud.dimension());
-        if required > limit {
-            return Err(too_many_coordinates(limit, required, cloud.n_points()).at(at));
-        }
+        let cloud = self.unregistered(points, &format!("{pointer}/points"))?;
         let normals = match normals {
             None => None,
             Some(normals) => Some(check_normals(normals, &cloud, &format!("{pointer}/normals"))?),

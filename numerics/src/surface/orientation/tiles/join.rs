@@ -1,6 +1,6 @@
 //! Joins the regions of all tiles, and chooses their sides.
 
-use super::pieces::{Contradiction, Piece, are_nested};
+use super::pieces::{Contradiction, Member, Piece, are_nested};
 use super::{Border, Region, TileRegions};
 use crate::error::NumericsError;
 use crate::surface::orientation::consistent::{CONTRADICTION, RESOLVED};
@@ -14,15 +14,6 @@ pub struct Side {
     pub sign: f64,
     /// True if the side is nearly a matter of chance.
     pub is_doubtful: bool,
-}
-
-/// A region of a tile as a part of a piece.
-pub(super) struct Member<'a> {
-    pub region: &'a Region,
-    /// Sign relative to the other regions of the piece.
-    pub relative: f64,
-    /// True if the signature function says something of the side of the region, in any tile.
-    pub has_sign: bool,
 }
 
 /// Regions of all tiles, those of one tile after those of another, with links between parts of one region.

@@ -10,6 +10,13 @@ mod regions;
 #[cfg(test)]
 mod tests;
 
+use crate::machine::price::Price;
 pub use join::{Side, Tiling};
 pub use regions::{Border, LabelledRegions, Region, Tile, TileRegions};
 pub(crate) use regions::{Signed, regions_of};
+
+/// The price of the sides of regions, with so many borders and links.
+pub fn sides_price(n_regions: usize, n_borders: usize) -> Price {
+    let n_numbers = n_regions.saturating_mul(24).saturating_add(n_borders.saturating_mul(8));
+    Price::of_numbers(n_numbers, 50.0 * (n_regions + n_borders) as f64)
+}

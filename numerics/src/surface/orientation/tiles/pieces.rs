@@ -1,7 +1,6 @@
 //! Connected pieces of the regions of all tiles, and the side of each.
 
 use super::Region;
-use super::join::Member;
 use crate::patches::n_regressed;
 use crate::surface::orientation::consistent::LOCAL_CONTRADICTION;
 use crate::surface::orientation::pieces::{Bounds, Evidence, are_several, is_large};
@@ -15,6 +14,15 @@ const RESOLVED_BY: usize = 10;
 pub(super) struct Contradiction {
     pub agreeing: f64,
     pub opposing: f64,
+}
+
+/// A region of a tile as a part of a piece.
+pub(super) struct Member<'a> {
+    pub region: &'a Region,
+    /// Sign relative to the other regions of the piece.
+    pub relative: f64,
+    /// True if the signature function says something of the side of the region, in any tile.
+    pub has_sign: bool,
 }
 
 /// A piece: the regions of it in every tile.
@@ -46,8 +54,8 @@ impl Piece<'_> {
         self.members.iter().map(|member| member.region.n_coarse).sum::<usize>() >= RESOLVED_BY
     }
 
-    /// Returns whether the piece is several surfaces that nearly touch. The function contradicts itself across
-    /// few of its edges, and encloses more by itself than with signs that go together.
+    /// Returns whether the piece is several surfaces that nearly touch. The function contradicts itself
+    /// across few of its edges, and encloses more by itself than with signs that go together.
     pub(super) fn is_several(&self) -> bool {
         let Contradiction { agreeing, opposing } = self.contradiction;
         let if_signed = |member: &Member<'_>, sign: f64| if member.has_sign { sign } else { 0.0 };

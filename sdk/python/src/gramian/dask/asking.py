@@ -1,0 +1,53 @@
+"""Operations of the service that only tiles need."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..arguments.fit import Fit
+from ..arguments.normalise import REQUEST, Rule
+from ..client import Client
+from ..cloud import Cloud
+from ..rest.models import CoarseResponse, Hyperparameters, SidesResponse
+from ..wire.tensors import JSON, Array, Members
+from .cells.cut import Ints
+
+REGIONS: Mapping[str, Rule] = {
+    **REQUEST,
+    "own": lambda _, value, __: np.asarray(value).tolist(),
+    "coarse": lambda _, value, __: np.asarray(value).tolist(),
+}
+
+
+def choose_coarse(client: Client, points: Array, **options: float) -> tuple[Ints, Fit]:
+    """Chooses points that are spread as the cloud is, with kernel and alpha of their signature function."""
+    connection = client._connection  # noqa: SLF001 (of this package)
+    response = connection.post("/v1/coarse", {"points": points, **options}, JSON)
+    found = connection.read(CoarseResponse.from_dict, response)
+    fit = Fit(solver="dense", kernel=found.kernel, alpha=found.alpha)
+    return np.array(found.points, dtype=np.int64), fit
+
+
+def find_regions(
+    cloud: Cloud, own: Ints, coarse: Ints, hyperparameters: Hyperparameters
+) -> tuple[Ints, dict[str, Any]]:
+    """Finds the regions of a tile: the region of each point, `[n]`, and what is said of the regions."""
+
+    def read(members: Members) -> tuple[Ints, dict[str, Any]]:
+        regions = {name: members[name] for name in ("regions", "borders", "n_edges")}
+        return np.asarray(members["labels"], dtype=np.int64), regions
+
+    return cloud._compute(  # noqa: SLF001 (of this package)
+        read, "/v1/regions", REGIONS, solver="local", own=own, coarse=coarse, hyperparameters=hyperparameters
+    )
+
+
+def choose_sides(client: Client, tiles: list[dict[str, Any]], links: Ints) -> tuple[Array, Any]:
+    """Chooses the sides of the regions of all tiles: signs, `[r]`, and whether they are doubtful, `[r]`."""
+    connection = client._connection  # noqa: SLF001 (of this package)
+    response = connection.post("/v1/sides", {"tiles": tiles, "links": links.tolist()}, JSON)
+    found = connection.read(SidesResponse.from_dict, response)
+    return np.array(found.signs, dtype=np.float64), np.array(found.are_doubtful, dtype=bool)

@@ -1,1 +1,0 @@
-"""Sides of a surface across tiles: regions of each, joined to pieces that have one side."""

@@ -1,0 +1,94 @@
+//! `POST /v1/coarse`: the part of a cloud that says which side of its surface is outward.
+
+use std::sync::Arc;
+
+use axum::Extension;
+use axum::extract::{Request, State};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::http::compute::JobObserver;
+use crate::http::fields::KernelUsed;
+use crate::http::openapi::responses::ComputeProblems;
+use crate::http::problem::{Pointers, Problem};
+use crate::http::serve::direct::{Direct, serve};
+use crate::http::serve::planner::Planner;
+use crate::http::state::app::App;
+use crate::http::wire::read::points::Points;
+use crate::http::wire::write::json::Json;
+use crate::store::Owner;
+use gramian_numerics::machine::price::Price;
+use gramian_numerics::surface::local::coarse::Coarse;
+use gramian_numerics::surface::price::coarse_price;
+
+/// A cloud, and how noisy it is.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CoarseRequest {
+    /// The points of the cloud, or some of a large one, chosen evenly.
+    #[schema(value_type = Vec<Vec<f64>>, min_items = 1)]
+    pub points: Points,
+    /// The number of points to choose. Default: a sixth of a small cloud, and at most 6,000.
+    #[schema(minimum = 1)]
+    pub count: Option<usize>,
+    /// The standard deviation of the noise of the points across the surface. Default: 0.
+    #[schema(minimum = 0.0)]
+    pub noise_deviation: Option<f64>,
+}
+
+/// A coarse cloud with the kernel and alpha of its signature function.
+#[derive(Serialize, ToSchema)]
+pub struct CoarseResponse {
+    /// The points, by their positions in the cloud, ascending. No two coincide.
+    points: Vec<usize>,
+    /// The kernel of the signature function.
+    kernel: KernelUsed,
+    /// Added to the diagonal of its matrix.
+    alpha: f64,
+}
+
+/// Choose a coarse cloud
+///
+/// Chooses points that are spread as the cloud is. Minus the gradient of the interpolant of the constant 1 at
+/// these points, with this kernel and alpha, points out of closed surfaces. Local regressions orient their
+/// normals by it. Tiles of a cloud orient theirs alike if they all take that of the whole cloud.
+#[utoipa::path(
+    post,
+    path = "/v1/coarse",
+    operation_id = "choose_coarse_cloud",
+    tag = "tiles",
+    request_body = CoarseRequest,
+    responses((status = 200, description = "The coarse cloud", body = CoarseResponse), ComputeProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn choose_coarse_cloud(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    request: Request,
+) -> Result<Json<CoarseResponse>, Problem> {
+    serve::<CoarseRequest>(app, owner, request).await
+}
+
+impl Direct for CoarseRequest {
+    const NAME: &'static str = "choose_coarse_cloud";
+    type Answer = CoarseResponse;
+
+    fn price(&self) -> Price {
+        coarse_price(self.points.n_rows, self.points.coordinates.len() / self.points.n_rows.max(1))
+    }
+
+    fn compute(self, planner: &Planner<'_>, observer: &JobObserver) -> Result<CoarseResponse, Problem> {
+        let noise = self.noise_deviation.unwrap_or_default();
+        if noise < 0.0 {
+            return Err(Problem::invalid_request("/noise_deviation", "must be 0 or more"));
+        }
+        if self.count == Some(0) {
+            return Err(Problem::invalid_request("/count", "must be 1 or more"));
+        }
+        let cloud = planner.unregistered(self.points, "/points")?;
+        let refuse = |error| Problem::from_numerics(error, Pointers { points: "/points", ..Pointers::REQUEST });
+        let coarse = Coarse::of(&cloud, self.count, noise, observer).map_err(refuse)?;
+        let Coarse { points, kernel, alpha, .. } = coarse;
+        Ok(CoarseResponse { points, kernel: KernelUsed::scaled(&kernel, 1.0), alpha })
+    }
+}

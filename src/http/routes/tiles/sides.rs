@@ -1,0 +1,104 @@
+//! `POST /v1/sides`: the sides of the regions of all tiles.
+
+use std::sync::Arc;
+
+use axum::Extension;
+use axum::extract::{Request, State};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::fields::{Border, Region};
+use crate::http::compute::JobObserver;
+use crate::http::openapi::responses::ComputeProblems;
+use crate::http::problem::{Pointers, Problem};
+use crate::http::serve::direct::{Direct, serve};
+use crate::http::serve::planner::Planner;
+use crate::http::state::app::App;
+use crate::http::wire::write::json::Json;
+use crate::store::Owner;
+use gramian_numerics::machine::price::Price;
+use gramian_numerics::surface::tiles::{self, Tiling};
+
+/// The regions of all tiles of a cloud, and which of them are parts of one region.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SidesRequest {
+    /// The regions of each tile, as `POST /v1/regions` answers them.
+    #[schema(min_items = 1)]
+    pub tiles: Vec<TileRegions>,
+    /// Pairs of regions that have a point in common, counted on from one tile to the next.
+    pub links: Vec<[usize; 2]>,
+}
+
+/// The regions of a tile.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TileRegions {
+    /// The regions.
+    pub regions: Vec<Region>,
+    /// Their borders.
+    pub borders: Vec<Border>,
+    /// The number of edges that the points would have on a surface that is sampled well.
+    pub n_edges: usize,
+}
+
+/// The sides of regions, in the order of the request.
+#[derive(Serialize, ToSchema)]
+pub struct SidesResponse {
+    /// 1 or −1 for each region: the sign to multiply its normals with.
+    signs: Vec<i8>,
+    /// True for each region whose side is nearly a matter of chance.
+    are_doubtful: Vec<bool>,
+}
+
+/// Join the regions of tiles
+///
+/// Chooses the sides of all regions together, by the rules for a whole cloud: regions are joined across their
+/// surest borders, and each connected piece has the side that its volume or its coarse cloud says.
+#[utoipa::path(
+    post,
+    path = "/v1/sides",
+    operation_id = "choose_sides",
+    tag = "tiles",
+    request_body = SidesRequest,
+    responses((status = 200, description = "The sides of all regions", body = SidesResponse), ComputeProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn choose_sides(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    request: Request,
+) -> Result<Json<SidesResponse>, Problem> {
+    serve::<SidesRequest>(app, owner, request).await
+}
+
+impl Direct for SidesRequest {
+    const NAME: &'static str = "choose_sides";
+    type Answer = SidesResponse;
+
+    fn price(&self) -> Price {
+        let sizes = self.tiles.iter().map(|tile| (tile.regions.len(), tile.borders.len()));
+        let (n_regions, n_borders) = sizes.fold((0, 0), |(a, b), (regions, borders)| (a + regions, b + borders));
+        tiles::sides_price(n_regions, n_borders + self.links.len())
+    }
+
+    fn compute(self, _: &Planner<'_>, _: &JobObserver) -> Result<SidesResponse, Problem> {
+        let tiles: Vec<tiles::TileRegions> = self.tiles.into_iter().map(TileRegions::into).collect();
+        let refuse = |error| Problem::from_numerics(error, Pointers::REQUEST);
+        let sides = Tiling::of(&tiles, &self.links).map_err(refuse)?.sides();
+        Ok(SidesResponse {
+            signs: sides.iter().map(|side| if side.sign < 0.0 { -1 } else { 1 }).collect(),
+            are_doubtful: sides.iter().map(|side| side.is_doubtful).collect(),
+        })
+    }
+}
+
+impl From<TileRegions> for tiles::TileRegions {
+    fn from(TileRegions { regions, borders, n_edges }: TileRegions) -> Self {
+        Self {
+            regions: regions.into_iter().map(Region::into).collect(),
+            borders: borders.into_iter().map(Border::into).collect(),
+            n_edges,
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! The way of a compute request that needs no model: read, admit, parse, compute, encode.
+
+use std::sync::Arc;
+
+use axum::extract::Request;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::intake::read_body;
+use super::operation::REQUEST_FORMATS;
+use super::planner::Planner;
+use crate::http::compute::{JobObserver, Work};
+use crate::http::problem::Problem;
+use crate::http::state::app::App;
+use crate::http::wire::write::json::Json;
+use crate::store::Owner;
+use gramian_numerics::machine::price::Price;
+
+/// A request that needs no model.
+pub trait Direct: DeserializeOwned + Send + 'static {
+    /// Operation id in the `OpenAPI` document.
+    const NAME: &'static str;
+    type Answer: Serialize + Send + 'static;
+
+    /// The price of the computation.
+    fn price(&self) -> Price;
+
+    /// Checks the request and computes its answer on the pool.
+    ///
+    /// # Errors
+    /// Returns the [`Problem`] for the client.
+    fn compute(self, planner: &Planner<'_>, observer: &JobObserver) -> Result<Self::Answer, Problem>;
+}
+
+/// Serves one request.
+///
+/// # Errors
+/// Returns the [`Problem`] for the client.
+pub async fn serve<D: Direct>(
+    app: Arc<App>,
+    owner: Owner,
+    request: Request,
+) -> Result<Json<D::Answer>, Problem> {
+    let (parts, body) = request.into_parts();
+    let intake = read_body(&app, owner, &parts.headers, body, &REQUEST_FORMATS).await?;
+    let admission = app.compute.admit(owner)?;
+    let (shared, flops) = (app.clone(), intake.body.flops_to_parse());
+    let parse = move |observer: &JobObserver| intake.parse::<D>(&shared, observer);
+    let (request, mut memory) = app.compute.run(&admission, flops, parse).await?.0?;
+    let Price { n_bytes, flops } = request.price();
+    if !memory.try_grow(n_bytes) {
+        return Err(app.compute.out_of_memory());
+    }
+    admission.set_work(Work { operation: D::NAME, is_cached: false, flops });
+    let shared = app.clone();
+    let compute = move |observer: &JobObserver| {
+        let answer = request.compute(&Planner::new(&shared, owner), observer);
+        drop(memory);
+        answer
+    };
+    let answer = app.compute.run(&admission, flops, compute).await?.0?;
+    admission.finish();
+    Ok(Json(answer))
+}
