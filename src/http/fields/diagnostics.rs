@@ -106,59 +106,49 @@ pub struct Diagnostics {
     pub kernel: KernelUsed,
     /// The number added to the diagonal. Absent with `noise_variances`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub alpha: Option<f64>,
     /// The solver used.
     pub solver: SolverUsed,
     /// The reason why `auto` chose a solver other than the dense one. Absent otherwise.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub solver_reason: Option<String>,
     /// The factorization of the matrix.
     pub factorization: FactorizationUsed,
     /// Numerical rank of the matrix.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub rank: Option<usize>,
     /// Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): roughly the fraction of digits that survive.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub reciprocal_condition: Option<f64>,
     /// ‖Y − (K + αI)Λ‖/‖Y‖ of the solve, where Y is the values without their mean. For matrices and surfaces,
     /// Y = 1.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub relative_residual: Option<f64>,
     /// ‖u‖² = ΛᵀKΛ, the squared norm in the native space of the kernel.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub native_norm_squared: Option<f64>,
     /// The mean of the function: the constant, then a slope per coordinate if it is linear. Absent if the
     /// mean is 0.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub mean_coefficients: Option<Vec<f64>>,
     /// |u(X) − Y|, unit of the values.
     ///
     /// Absent for values from the local solver, which is not evaluated at the points.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub misfit: Option<f64>,
     /// Estimated standard deviation of the noise of the points across the surface, length.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub noise_deviation: Option<f64>,
     /// Number of points that were merged into an earlier point.
     pub n_merged_duplicates: usize,
     /// Number of rows of a sparse operator by how their weights were computed.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub stencils: Option<StencilsUsed>,
     /// Changes that were made, and limits of the accuracy.
     pub warnings: Vec<Warning>,
     /// Diagnostics of the fit of the surface, in answers about values on a surface.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, no_recursion)]
+    #[schema(no_recursion)]
     pub geometry: Option<Box<Diagnostics>>,
 }
 

@@ -53,11 +53,11 @@ pub struct ProgressView {
     fraction: f64,
     /// Relative residual of the last solve. Absent before there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, minimum = 0.0)]
+    #[schema(minimum = 0.0)]
     residual: Option<f64>,
     /// Seconds until the job is done, predicted from what ran on this machine. Absent while unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, minimum = 0.0)]
+    #[schema(minimum = 0.0)]
     seconds_left: Option<f64>,
 }
 
@@ -77,15 +77,15 @@ pub struct JobView {
     created_at: String,
     /// The time at which the job ended, in UTC. Absent before.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, format = DateTime)]
+    #[schema(format = DateTime)]
     ended_at: Option<String>,
     /// The time until which the result is kept, in UTC. Absent before there is a result.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, format = DateTime)]
+    #[schema(format = DateTime)]
     expires_at: Option<String>,
     /// The problem that made the job fail, and that the request would have been answered with.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, value_type = Option<crate::http::problem::ProblemDocument<'static>>)]
+    #[schema(value_type = Option<crate::http::problem::ProblemDocument<'static>>)]
     problem: Option<Value>,
 }
 

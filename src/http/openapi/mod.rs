@@ -7,6 +7,7 @@ pub mod examples;
 mod formats;
 mod headers;
 mod links;
+mod optional;
 pub mod responses;
 
 use serde_json::Value;
@@ -66,6 +67,7 @@ pub fn complete(document: &mut utoipa::openapi::OpenApi) {
     headers::add(document);
     links::add(document);
     empty_answers_to_head(document);
+    optional::refuse_null(document);
 }
 
 /// Removes the bodies of answers to HEAD, which has none, whatever the problem.

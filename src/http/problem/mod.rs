@@ -69,7 +69,6 @@ pub struct ProblemDocument<'a> {
     errors: &'a [FieldError],
     /// An alpha for which the computation succeeds, unit of the values squared.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     minimum_alpha: Option<f64>,
     /// The points in question, as positions in the cloud. At most the first 1,000.
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
@@ -77,11 +76,9 @@ pub struct ProblemDocument<'a> {
     point_indices: &'a [usize],
     /// The limit that was exceeded, in the unit that `detail` names.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     limit: Option<u64>,
     /// The size that the request would have needed, in the unit of `limit`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     required: Option<u64>,
 }
 

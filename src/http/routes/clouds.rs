@@ -49,7 +49,7 @@ pub struct CloudRequest {
     ///
     /// They may have any length but 0. The side they point to is outward. An empty list counts as absent.
     #[serde(default, deserialize_with = "present_unless_empty")]
-    #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+    #[schema(value_type = Option<Vec<Vec<f64>>>)]
     pub normals: Option<Points>,
 }
 
@@ -90,7 +90,6 @@ pub struct Cloud {
     /// Absent if all points coincide. A list of clouds has it only once a kernel was chosen for the cloud, or
     /// the cloud was registered or described by itself.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     spacing: Option<Spacing>,
     /// Number of points that coincide with an earlier point.
     n_duplicates: usize,
@@ -143,7 +142,7 @@ pub struct CloudList {
     clouds: Vec<Cloud>,
     /// The cursor of the next page. Absent on the last page.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, value_type = Option<CursorSchema>)]
+    #[schema(value_type = Option<CursorSchema>)]
     next: Option<String>,
 }
 

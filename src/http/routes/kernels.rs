@@ -34,7 +34,6 @@ pub struct KernelDescription {
     parameters: Vec<KernelParameter>,
     /// The largest dimension in which the kernel is positive definite. Absent if there is no limit.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     max_dimension: Option<usize>,
     /// The condition under which the kernel has derivatives at the points of the cloud.
     ///

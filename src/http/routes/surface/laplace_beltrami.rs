@@ -21,9 +21,7 @@ use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::planner::Planner;
 use crate::http::state::app::App;
 use crate::http::wire::negotiation::Format;
-use crate::http::wire::read::members::{
-    present, present_object, present_unless_empty, present_word, present_words,
-};
+use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
@@ -40,20 +38,13 @@ request! {
         #[schema(min_items = 1)]
         pub values: Vec<f64>,
         /// The mean of the function. Default: a constant if `kernel` is absent too, else 0.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
         /// The points to compute at, one row of coordinates each. Default: the points of the surface's cloud.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The surface, if its fit differs from that of the values.
-        #[serde(default, deserialize_with = "present_object")]
-        #[schema(nullable = false)]
         pub geometry: Option<Geometry>,
         /// Optional parts of the answer. Default: none.
-        #[serde(default, deserialize_with = "present_words")]
-        #[schema(nullable = false)]
         pub include: Option<Vec<ValuesInclude>>,
     }
 }
@@ -72,23 +63,17 @@ request! {
     pub struct LaplaceBeltramiMatrixRequest {
         /// The points to compute rows for, one row of the matrix each. Default: the points of the surface's
         /// cloud.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The surface, if its fit differs from that of the values.
-        #[serde(default, deserialize_with = "present_object")]
-        #[schema(nullable = false)]
         pub geometry: Option<Geometry>,
         /// The mean of the functions through the values. Default: 0.
         ///
         /// With a constant mean, the matrix maps constants to exactly 0.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
         /// Deprecated: matrices of this path are dense. For sparse ones, use
         /// `/v1/laplace-beltrami/sparse-matrix`.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false, deprecated)]
+        #[schema(deprecated)]
         pub format: Option<MatrixFormat>,
     }
 }
@@ -103,7 +88,7 @@ answer! {
         ///
         /// It comes from noise and gaps of the values and, as far as the surface has deviations, also from
         /// the surface. Null where there is no answer or no deviation.
-        #[schema(nullable = false, value_type = Option<Vec<Option<f64>>>)]
+        #[schema(value_type = Option<Vec<Option<f64>>>)]
         value_deviations: Option<Array>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,
@@ -237,19 +222,16 @@ request! {
     /// A cloud of nodes on a surface, and queries for the rows of its sparse Laplace–Beltrami matrix.
     pub struct LaplaceBeltramiSparseMatrixRequest {
         /// The points to compute rows for, one row of the matrix each. Default: the points of the surface.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The surface, if it differs from that of the request.
-        #[serde(default, deserialize_with = "present_object")]
-        #[schema(nullable = false)]
         pub geometry: Option<Geometry>,
         /// At most 192 points of the cloud, where `"solver": "local"` learns noise and shape of the surface.
         ///
         /// Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
         /// the same sites and the points around them.
         #[serde(default, deserialize_with = "present_unless_empty")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, max_items = 192)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, max_items = 192)]
         pub sites: Option<Points>,
     }
 }

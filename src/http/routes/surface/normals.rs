@@ -17,7 +17,7 @@ use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::planner::Planner;
 use crate::http::state::app::App;
-use crate::http::wire::read::members::{present, present_unless_empty, present_word, present_words};
+use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
@@ -28,27 +28,20 @@ request! {
     /// A cloud that samples a hypersurface, and queries at which to compute its normals.
     pub struct NormalsRequest {
         /// The points to compute at, one row of coordinates each. Default: the points of the cloud.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The function whose level set is the surface. Default: `auto`.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub surface: Option<SurfaceChoice>,
         /// The direction of normals. Default: `outward`.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub orientation: Option<OrientationChoice>,
         /// Optional parts of the answer. Default: none.
-        #[serde(default, deserialize_with = "present_words")]
-        #[schema(nullable = false)]
         pub include: Option<Vec<GeometryInclude>>,
         /// At most 192 points of the cloud, where `"solver": "local"` learns noise and shape of the surface.
         ///
         /// Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
         /// the same sites and the points around them.
         #[serde(default, deserialize_with = "present_unless_empty")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, max_items = 192)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, max_items = 192)]
         pub sites: Option<Points>,
     }
 }
@@ -73,7 +66,7 @@ answer! {
         ///
         /// 95 % of the angles lie within 1.96 standard deviations. Null where there is no answer or the
         /// deviation is not known.
-        #[schema(value_type = Option<Vec<Option<f64>>>, nullable = false)]
+        #[schema(value_type = Option<Vec<Option<f64>>>)]
         normal_deviations: Option<Array>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,

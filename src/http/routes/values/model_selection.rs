@@ -20,7 +20,6 @@ use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::plan::Cost;
 use crate::http::serve::planner::{DenseOnly, GivenValues, Planner};
 use crate::http::state::app::App;
-use crate::http::wire::read::members::{present, present_word, present_words, word};
 use crate::http::wire::write::answer::{Member, Parts, answer};
 use crate::http::wire::write::array::Array;
 use crate::http::wire::write::json::Nullable;
@@ -63,11 +62,9 @@ pub enum SelectionParameter {
 #[serde(deny_unknown_fields)]
 pub struct FreeParameter {
     /// The parameter.
-    #[serde(deserialize_with = "word")]
     pub parameter: SelectionParameter,
     /// The axis, from 0, for `length_scales` only. Default: every axis, each within these bounds.
-    #[serde(default, deserialize_with = "present")]
-    #[schema(nullable = false, minimum = 0)]
+    #[schema(minimum = 0)]
     pub axis: Option<usize>,
     /// The lower bound.
     #[schema(exclusive_minimum = 0.0)]
@@ -86,12 +83,8 @@ request! {
         #[schema(min_items = 1)]
         pub values: Vec<f64>,
         /// The mean of the function. Default: a constant if `kernel` is absent too, else 0.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
         /// The score to maximize. Default: the marginal likelihood.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub criterion: Option<SelectionCriterion>,
         /// The free parameters and their bounds, at most 64 entries. Default: length scale, variance, alpha.
         ///
@@ -100,22 +93,16 @@ request! {
         /// is given for each point. Its lower bound is a millionth of its start, or of a millionth of the
         /// variance if that is more. Its upper bound is a hundred times its start, or a hundred times the
         /// variance if that is more.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false)]
         pub vary: Option<Vec<FreeParameter>>,
         /// Kernel families to try. Default: that of the start, and `matern` if `nu` varies.
         ///
         /// A family takes the parameters of `kernel` if `kernel` is of that family.
-        #[serde(default, deserialize_with = "present_words")]
-        #[schema(nullable = false)]
         pub families: Option<Vec<KernelFamily>>,
         /// Number of further starts for each family, spread over the bounds. Default: 2.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, minimum = 0, maximum = 100)]
+        #[schema(minimum = 0, maximum = 100)]
         pub restarts: Option<u8>,
         /// The seed that determines the further starts. Default: 0.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, minimum = 0, maximum = 9007199254740991u64)]
+        #[schema(minimum = 0, maximum = 9007199254740991u64)]
         pub seed: Option<u64>,
     }
 }
@@ -157,7 +144,6 @@ pub struct FamilyScore {
     pub family: KernelFamily,
     /// The smoothness ν of the Matérn family. Absent for other families.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub nu: Option<f64>,
     /// The best score of the family. Null if the matrix was not positive definite from any start.
     #[schema(value_type = Option<f64>, nullable = true)]
@@ -170,11 +156,10 @@ answer! {
         /// The selected kernel. Sent as `kernel` of a request, it is used as it is.
         kernel: KernelUsed,
         /// The selected variance of the noise. Absent with `noise_variances`.
-        #[schema(nullable = false)]
         alpha: Option<f64>,
         /// The mean of the function: the constant, then a slope per coordinate if it is linear. Absent if the
         /// mean is 0.
-        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
+        #[schema(value_type = Option<Vec<f64>>)]
         mean_coefficients: Option<Array>,
         /// The score of the selection. Greater is better.
         score: f64,

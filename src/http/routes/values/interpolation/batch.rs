@@ -17,7 +17,6 @@ use crate::http::serve::plan::Cost;
 use crate::http::serve::planner::{DenseOnly, Planner, value_lists};
 use crate::http::serve::values::mean_coefficients;
 use crate::http::state::app::App;
-use crate::http::wire::read::members::{present, present_word, present_words};
 use crate::http::wire::read::points::{Points, ValueLists};
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
@@ -37,20 +36,14 @@ request! {
         #[schema(value_type = Vec<Vec<f64>>, min_items = 1)]
         pub values: ValueLists,
         /// The mean of each function. Default: a constant if `kernel` is absent too, else 0.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
         /// The points to evaluate at, one row of coordinates each. Default: the points of the cloud.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The highest order of derivatives: 0 for values, 1 adds gradients, 2 adds Hessians. Default: 0.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, minimum = 0, maximum = 2)]
+        #[schema(minimum = 0, maximum = 2)]
         pub derivatives: Option<u8>,
         /// Optional parts of the answer. Default: none.
-        #[serde(default, deserialize_with = "present_words")]
-        #[schema(nullable = false)]
         pub include: Option<Vec<ValuesInclude>>,
     }
 }
@@ -64,34 +57,34 @@ answer! {
         /// Gradients ∇u at each query for each list, unit of the values per length.
         ///
         /// Present if `derivatives` is 1 or 2.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
+        #[schema(value_type = Option<Vec<Vec<Vec<f64>>>>)]
         gradients: Option<Array>,
         /// Hessians D²u at each query for each list, unit of the values per length squared.
         ///
         /// Present if `derivatives` is 2.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<Vec<f64>>>>>)]
+        #[schema(value_type = Option<Vec<Vec<Vec<Vec<f64>>>>>)]
         hessians: Option<Array>,
         /// Standard deviation of each function at each query, given its values. Present if `include` has
         /// `deviations`.
         ///
         /// The kernel is taken as covariance, and alpha as variance of the noise. All lists have the same
         /// deviations.
-        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
+        #[schema(value_type = Option<Vec<f64>>)]
         value_deviations: Option<Array>,
         /// Standard deviation of each component of ∇u at each query.
         ///
         /// Present if `include` has `deviations` and `derivatives` is 1 or 2.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>)]
         gradient_deviations: Option<Array>,
         /// Standard deviation of each entry of D²u at each query.
         ///
         /// Present if `include` has `deviations` and `derivatives` is 2.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
+        #[schema(value_type = Option<Vec<Vec<Vec<f64>>>>)]
         hessian_deviations: Option<Array>,
         /// The mean of each function, a row per list. Absent if the mean is 0.
         ///
         /// A row is the constant, followed by a slope per coordinate if the mean is linear.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>)]
         mean_coefficients: Option<Array>,
         /// The numbers used, the method, its accuracy, and warnings. `relative_residual` is the largest of
         /// all lists.

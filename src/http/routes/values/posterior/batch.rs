@@ -16,9 +16,7 @@ use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::planner::{Planner, value_lists};
 use crate::http::state::app::App;
-use crate::http::wire::read::members::{
-    present, present_object, present_unless_empty, present_word, present_words,
-};
+use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::{Points, ValueLists};
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
@@ -33,30 +31,21 @@ request! {
         #[schema(value_type = Vec<Vec<f64>>, min_items = 1)]
         pub values: ValueLists,
         /// The mean of each process. Default: a constant if `kernel` is absent too, else 0.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
         /// The points to evaluate at, one row of coordinates each. Default: the points of the cloud.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// Optional parts of the answer beside the means. Default: none.
-        #[serde(default, deserialize_with = "present_words")]
-        #[schema(nullable = false)]
         pub include: Option<Vec<PosteriorQuantity>>,
         /// Joint draws of each latent function at all queries. Default: none.
-        #[serde(default, deserialize_with = "present_object")]
-        #[schema(nullable = false)]
         pub samples: Option<Samples>,
         /// Probabilities between 0 and 1 for quantiles of the latent functions. Default: none.
         ///
         /// An empty list counts as absent.
         #[serde(default, deserialize_with = "present_unless_empty")]
-        #[schema(nullable = false, max_items = 1000)]
+        #[schema(max_items = 1000)]
         pub quantiles: Option<Vec<f64>>,
         /// The threshold of `exceedance_probabilities` for a new observation, unit of the values.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false)]
         pub threshold: Option<f64>,
     }
 }
@@ -70,36 +59,35 @@ answer! {
         #[schema(value_type = Vec<Vec<f64>>)]
         means: Array,
         /// The variance of the latent functions at each query.
-        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
+        #[schema(value_type = Option<Vec<f64>>)]
         variances: Option<Array>,
         /// The variance of a new observation at each query.
-        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
+        #[schema(value_type = Option<Vec<f64>>)]
         observation_variances: Option<Array>,
         /// The covariance of the latent functions between queries.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>)]
         covariance: Option<Array>,
         /// The gradient of the mean at each query, for each list.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
+        #[schema(value_type = Option<Vec<Vec<Vec<f64>>>>)]
         gradients: Option<Array>,
         /// The variances of the components of the latent functions' gradients at each query.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>)]
         gradient_variances: Option<Array>,
         /// Draws of the latent function for each list. A draw is a row, with a number per query.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
+        #[schema(value_type = Option<Vec<Vec<Vec<f64>>>>)]
         samples: Option<Array>,
         /// Quantiles of the latent function for each list. A probability is a row, with a number per query.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
+        #[schema(value_type = Option<Vec<Vec<Vec<f64>>>>)]
         quantiles: Option<Array>,
         /// The probability that a new observation exceeds `threshold` at each query, a row per list.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>)]
         exceedance_probabilities: Option<Array>,
         /// The log marginal likelihood of each list, −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
-        #[schema(nullable = false)]
         log_marginal_likelihoods: Option<Vec<f64>>,
         /// The mean of each function, a row per list. Absent if the mean is 0.
         ///
         /// A row is the constant, followed by a slope per coordinate if the mean is linear.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>)]
         mean_coefficients: Option<Array>,
         /// The numbers used, the method, its accuracy, and warnings. `relative_residual` is the largest of
         /// all lists.

@@ -19,9 +19,7 @@ use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::planner::{GivenValues, Planner};
 use crate::http::state::app::App;
-use crate::http::wire::read::members::{
-    present, present_object, present_unless_empty, present_word, present_words,
-};
+use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
@@ -70,30 +68,21 @@ request! {
         #[schema(min_items = 1)]
         pub values: Vec<f64>,
         /// The mean of the process. Default: a constant if `kernel` is absent too, else 0.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
         /// The points to evaluate at, one row of coordinates each. Default: the points of the cloud.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// Optional parts of the answer beside the mean. Default: none.
-        #[serde(default, deserialize_with = "present_words")]
-        #[schema(nullable = false)]
         pub include: Option<Vec<PosteriorQuantity>>,
         /// Joint draws of the latent function at all queries. Default: none.
-        #[serde(default, deserialize_with = "present_object")]
-        #[schema(nullable = false)]
         pub samples: Option<Samples>,
         /// Probabilities between 0 and 1 for quantiles of the latent function. Default: none.
         ///
         /// An empty list counts as absent.
         #[serde(default, deserialize_with = "present_unless_empty")]
-        #[schema(nullable = false, max_items = 1000)]
+        #[schema(max_items = 1000)]
         pub quantiles: Option<Vec<f64>>,
         /// The threshold of `exceedance_probabilities` for a new observation, unit of the values.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false)]
         pub threshold: Option<f64>,
     }
 }
@@ -105,31 +94,30 @@ answer! {
         #[schema(value_type = Vec<f64>)]
         means: Array,
         /// The variance of the latent function at each query, no noise added, unit of the values squared.
-        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
+        #[schema(value_type = Option<Vec<f64>>)]
         variances: Option<Array>,
         /// The variance of a new observation at each query.
-        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
+        #[schema(value_type = Option<Vec<f64>>)]
         observation_variances: Option<Array>,
         /// The covariance of the latent function between queries.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>)]
         covariance: Option<Array>,
         /// The gradient of the mean at each query, unit of the values per length.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>)]
         gradients: Option<Array>,
         /// The variances of the components of the latent function's gradient at each query.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>)]
         gradient_variances: Option<Array>,
         /// Draws of the latent function. A draw is a row, with a number per query.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>)]
         samples: Option<Array>,
         /// Quantiles of the latent function. A probability is a row, with a number per query.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>)]
         quantiles: Option<Array>,
         /// The probability that a new observation exceeds `threshold`, at each query.
-        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
+        #[schema(value_type = Option<Vec<f64>>)]
         exceedance_probabilities: Option<Array>,
         /// The log marginal likelihood of the values, −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
-        #[schema(nullable = false)]
         log_marginal_likelihood: Option<f64>,
         /// The numbers used, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
