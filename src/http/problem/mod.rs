@@ -159,27 +159,24 @@ impl Problem {
 
     /// 503 if no place, memory or thread is free.
     pub fn overloaded(retry_after_seconds: u64) -> Self {
-        let detail =
-            format!("all that can be served at once is being served; try again in {retry_after_seconds} s");
-        let mut problem = Self::new(Slug::Overloaded, detail);
-        problem.members.retry_after_seconds = Some(retry_after_seconds);
-        problem
+        Self::unavailable("all that can be served at once is being served", retry_after_seconds)
     }
 
     /// 429 beyond a limit of the key.
     pub fn rate_limited(limit: &str, retry_after_seconds: u64) -> Self {
         let detail = format!("this key may make {limit}; try again in {retry_after_seconds} s");
-        let mut problem = Self::new(Slug::RateLimited, detail);
-        problem.members.retry_after_seconds = Some(retry_after_seconds);
-        problem
+        Self::new(Slug::RateLimited, detail).retry_after(retry_after_seconds)
     }
 
     /// 503 for another reason than a full queue.
     pub fn unavailable(reason: &str, retry_after_seconds: u64) -> Self {
         let detail = format!("{reason}; try again in {retry_after_seconds} s");
-        let mut problem = Self::new(Slug::Overloaded, detail);
-        problem.members.retry_after_seconds = Some(retry_after_seconds);
-        problem
+        Self::new(Slug::Overloaded, detail).retry_after(retry_after_seconds)
+    }
+
+    fn retry_after(mut self, seconds: u64) -> Self {
+        self.members.retry_after_seconds = Some(seconds);
+        self
     }
 
     /// 503 of a process that is shutting down.
@@ -270,10 +267,9 @@ impl Problem {
                 Self::new(Slug::InvalidRequest, format!("{detail}; scale the values or the length scale"))
             }
             E::OutOfMemory { .. } => {
-                let mut problem =
+                let problem =
                     Self::new(Slug::Overloaded, format!("{detail}; try again when less is computed"));
-                problem.members.retry_after_seconds = Some(RETRY_AFTER_MEMORY_SECONDS);
-                problem
+                problem.retry_after(RETRY_AFTER_MEMORY_SECONDS)
             }
             E::MeanNotDetermined => at(Slug::InvalidRequest, "/mean"),
             E::WeightsOverflow => at(Slug::InvalidRequest, "/values"),
