@@ -5,8 +5,7 @@ use utoipa::ToSchema;
 
 use super::kernel::KernelUsed;
 use super::schemas::CloudIdSchema;
-use crate::http::problem::Problem;
-use crate::http::wire::write::answer::{Member, Parts};
+use crate::http::wire::write::answer::json_members;
 use gramian_numerics::solver::{Disagreement, Outlier, Place};
 use gramian_numerics::surface::operators::{RowKind, Stencils};
 
@@ -191,9 +190,7 @@ impl Diagnostics {
         );
         self.warnings.push(Warning { code: WarningCode::VarianceClamped, detail });
     }
-}
 
-impl Diagnostics {
     /// Warns that values contradict kernel and noise, and suggests a remedy.
     pub fn warn_of_misfit(&mut self, found: Disagreement, remedy: &str) {
         let spread = found.mean_square.sqrt();
@@ -212,9 +209,7 @@ impl Diagnostics {
         };
         self.warnings.push(Warning { code: WarningCode::Misfit, detail });
     }
-}
 
-impl Diagnostics {
     /// Warns that neighbourhoods are too small.
     ///
     /// `deviations` is by how many deviations values from half of a neighbourhood differ from those of all of
@@ -229,11 +224,7 @@ impl Diagnostics {
     }
 }
 
-impl Member for Diagnostics {
-    fn add_to(self, name: &'static str, parts: &mut Parts) -> Result<(), Problem> {
-        parts.add_json(name, &self)
-    }
-}
+json_members!(Diagnostics);
 
 /// The reason why a query is degenerate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]

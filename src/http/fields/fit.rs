@@ -35,6 +35,11 @@ pub struct Geometry {
 /// A request about a cloud.
 pub trait HasCloud {
     fn cloud(&self) -> &CloudRef;
+
+    /// The cloud of the surface, where it may differ from that of the values.
+    fn surface_cloud(&self) -> Option<&CloudRef> {
+        None
+    }
 }
 
 /// The fields that determine a fit, moved out of a request.
@@ -52,10 +57,14 @@ pub struct Fit {
 }
 
 /// Declares a request. The fields of a fit and the request's own fields are members of the same object.
+///
+/// `with` names the field that holds the [`Geometry`] of the surface, where the request has one.
 macro_rules! request {
     (
         $(#[$meta:meta])*
-        pub struct $name:ident { $($(#[$field_meta:meta])* pub $field:ident: $type:ty,)* }
+        pub struct $name:ident $(with $geometry:ident)? {
+            $($(#[$field_meta:meta])* pub $field:ident: $type:ty,)*
+        }
     ) => {
         $(#[$meta])*
         #[derive(Debug, serde::Deserialize, utoipa::ToSchema)]
@@ -90,6 +99,10 @@ macro_rules! request {
             fn cloud(&self) -> &$crate::http::fields::CloudRef {
                 &self.cloud
             }
+
+            $(fn surface_cloud(&self) -> Option<&$crate::http::fields::CloudRef> {
+                self.$geometry.as_ref()?.cloud.as_ref()
+            })?
         }
 
         impl $name {

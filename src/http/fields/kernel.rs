@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 use super::schemas::Smoothness;
 use crate::http::problem::{Pointers, Problem};
 use crate::http::wire::read::members::present_unless_empty;
-use crate::http::wire::write::answer::{Member, Parts};
+use crate::http::wire::write::answer::json_members;
 use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::kernel::{Family, Kernel as NumericalKernel, WendlandSmoothness};
 use gramian_numerics::patches::PatchKernel;
@@ -181,11 +181,7 @@ impl Kernel {
     }
 }
 
-impl Member for KernelUsed {
-    fn add_to(self, name: &'static str, parts: &mut Parts) -> Result<(), Problem> {
-        parts.add_json(name, &self)
-    }
-}
+json_members!(KernelUsed);
 
 impl KernelUsed {
     /// The kernel of the heights of local regressions: Matérn with ν = 9/2.
@@ -201,9 +197,7 @@ impl KernelUsed {
             smoothness: None,
         }
     }
-}
 
-impl KernelUsed {
     /// A kernel whose variance is multiplied by a factor.
     pub fn scaled(kernel: &NumericalKernel, factor: f64) -> Self {
         let used = Self::from(kernel);

@@ -13,7 +13,7 @@ pub mod responses;
 use serde_json::Value;
 use utoipa::openapi::RefOr;
 use utoipa::openapi::path::{Operation, PathItem};
-use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityScheme};
+use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme};
 use utoipa::{Modify, OpenApi};
 
 use super::problem::ProblemDocument;
@@ -58,6 +58,15 @@ impl Modify for BearerKeys {
         let components = document.components.get_or_insert_default();
         components.add_security_scheme("bearer", SecurityScheme::Http(scheme.build()));
     }
+}
+
+/// Declares whether operations take a key. Where no keys are configured, they do without.
+pub fn set_security(document: &mut utoipa::openapi::OpenApi, takes_key: bool) {
+    let mut security = vec![SecurityRequirement::default()];
+    if takes_key {
+        security.push(SecurityRequirement::new::<_, [&str; 0], &str>("bearer", []));
+    }
+    operations(document).for_each(|operation| operation.security = Some(security.clone()));
 }
 
 /// Completes the document that the routes declare.

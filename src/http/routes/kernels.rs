@@ -54,10 +54,8 @@ pub struct KernelList {
 #[utoipa::path(
     get,
     path = "/v1/kernels",
-    operation_id = "list_kernels",
     tag = "values",
-    responses((status = 200, description = "All families", body = KernelList), ReadProblems),
-    security((), ("bearer" = []))
+    responses((status = 200, description = "All families", body = KernelList), ReadProblems)
 )]
 pub async fn list_kernels() -> Json<KernelList> {
     let always = "always";

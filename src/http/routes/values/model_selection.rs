@@ -2,28 +2,21 @@
 
 mod search;
 
-use std::sync::Arc;
-
-use axum::Extension;
-use axum::extract::{Request, State};
-use axum::response::Response;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::http::compute::JobObserver;
 use crate::http::fields::{Diagnostics, DuplicatePolicy, Fit, KernelFamily, KernelUsed, MeanChoice, request};
-use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
+use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
-use crate::http::serve::operation::{Operation, Plan, serve};
+use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::plan::Cost;
 use crate::http::serve::planner::{DenseOnly, GivenValues, Planner};
-use crate::http::state::app::App;
-use crate::http::wire::write::answer::{Member, Parts, answer};
+use crate::http::wire::write::answer::{answer, json_members};
 use crate::http::wire::write::array::Array;
 use crate::http::wire::write::json::Nullable;
-use crate::store::Owner;
 use search::{Search, Work};
 
 /// The score that a selection maximizes.
@@ -131,11 +124,7 @@ pub struct LeftOut {
     pub log_predictive_densities: Vec<Nullable>,
 }
 
-impl Member for LeftOut {
-    fn add_to(self, name: &'static str, parts: &mut Parts) -> Result<(), Problem> {
-        parts.add_json(name, &self)
-    }
-}
+json_members!(LeftOut);
 
 /// The best score of a family.
 #[derive(Debug, Clone, Serialize, ToSchema)]
@@ -159,16 +148,14 @@ answer! {
         alpha: Option<f64>,
         /// The mean of the function: the constant, then a slope per coordinate if it is linear. Absent if the
         /// mean is 0.
-        #[schema(value_type = Option<Vec<f64>>)]
-        mean_coefficients: Option<Array>,
+        mean_coefficients: Option<Array> as Option<Vec<f64>>,
         /// The score of the selection. Greater is better.
         score: f64,
         /// Derivatives of the score in the logarithms of the free parameters, in the order of `vary`.
         ///
         /// For `length_scales` without an axis, the derivative is in the logarithm of a common factor of all
         /// length scales. Null for `nu`, which takes steps.
-        #[schema(value_type = Vec<Option<f64>>)]
-        gradient: Vec<Nullable>,
+        gradient: Vec<Nullable> as Vec<Option<f64>>,
         /// True if no slope is left to follow within the bounds.
         converged: bool,
         /// Number of evaluations of the score.
@@ -186,6 +173,7 @@ answer! {
     }
 }
 
+operation! {
 /// Select a model
 ///
 /// Searches the kernel and the noise that explain the values best, by marginal likelihood, leave-one-out or
@@ -196,21 +184,8 @@ answer! {
 /// The answer has the selection, the score over alpha, and predictions of each value from all others. Every
 /// evaluation costs a few factorizations, so clouds may have at most 5,000 points. For larger clouds, select
 /// on a sample of the points, and send the result with all of them.
-#[utoipa::path(
-    post,
-    path = "/v1/model-selection",
-    operation_id = "select_model",
-    tag = "values",
-    request_body = ModelSelectionRequest,
-    responses((status = 200, description = "What explains the values best", body = ModelSelectionResponse), ComputeProblems),
-    security((), ("bearer" = []))
-)]
-pub async fn select_model(
-    State(app): State<Arc<App>>,
-    Extension(owner): Extension<Owner>,
-    request: Request,
-) -> Result<Response, Problem> {
-    serve::<ModelSelectionRequest>(app, owner, request).await
+pub async fn select_model(ModelSelectionRequest) -> ModelSelectionResponse;
+path: "/v1/model-selection", tag: "values", answer: "What explains the values best"
 }
 
 /// Number of α on a path.
@@ -227,10 +202,8 @@ const MAX_PATH_POINTS: usize = 3000;
 const MAX_POINTS: usize = 5000;
 
 impl Operation for ModelSelectionRequest {
-    const NAME: &'static str = "select_model";
     type Work = Work;
     type Answer = ModelSelectionResponse;
-    const HAS_SURFACE: bool = false;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let search = Search::of(&self)?;
@@ -252,7 +225,7 @@ impl Operation for ModelSelectionRequest {
         }
         search.check_axes_of(d)?;
         let n_numbers = planner.check_answer(n.checked_mul(3).and_then(|n| n.checked_add(4 * N_ALPHAS)))?;
-        let cost = Cost { work: search.price((n, d), main.n_length_scales()), n_numbers, n_held: n };
+        let cost = Cost { work: search.price(n, d, main.n_length_scales()), n_numbers, n_held: n };
         Ok(Plan { main: main.into(), surface: None, work: Work { values, search }, cost })
     }
 
