@@ -16,9 +16,7 @@ use gramian::http::problem::Problem;
 use gramian::http::wire::negotiation::{Coding, Format};
 use gramian::http::wire::read::body::RequestBody;
 use gramian::http::wire::read::limits::ParseContext;
-use gramian::http::wire::read::members::{
-    object, present, present_object, present_unless_empty, present_word, present_words,
-};
+use gramian::http::wire::read::members::present_unless_empty;
 use gramian::http::wire::read::points::Points;
 use gramian_numerics::observer::Unobserved;
 use peak_alloc::PeakAlloc;
@@ -47,17 +45,12 @@ const CONTEXT: ParseContext<'static> =
 #[serde(deny_unknown_fields)]
 #[expect(dead_code, reason = "it is parsed and dropped")]
 struct Request {
-    #[serde(deserialize_with = "object")]
     cloud: Cloud,
-    #[serde(default, deserialize_with = "present_object")]
     kernel: Option<Kernel>,
-    #[serde(default, deserialize_with = "present")]
     values: Option<Vec<f64>>,
     #[serde(default, deserialize_with = "present_unless_empty")]
     noise_variances: Option<Vec<f64>>,
-    #[serde(default, deserialize_with = "present")]
     queries: Option<Points>,
-    #[serde(default, deserialize_with = "present_words")]
     include: Option<Vec<Family>>,
 }
 
@@ -65,9 +58,7 @@ struct Request {
 #[serde(deny_unknown_fields)]
 #[expect(dead_code, reason = "it is parsed and dropped")]
 struct Cloud {
-    #[serde(default, deserialize_with = "present")]
     id: Option<String>,
-    #[serde(default, deserialize_with = "present")]
     points: Option<Points>,
     #[serde(default, deserialize_with = "present_unless_empty")]
     normals: Option<Points>,
@@ -77,9 +68,7 @@ struct Cloud {
 #[serde(deny_unknown_fields)]
 #[expect(dead_code, reason = "it is parsed and dropped")]
 struct Kernel {
-    #[serde(default, deserialize_with = "present_word")]
     family: Option<Family>,
-    #[serde(default, deserialize_with = "present")]
     length_scale: Option<f64>,
 }
 

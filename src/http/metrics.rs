@@ -14,6 +14,7 @@ use prometheus::{
 
 use super::problem::slug::Slug;
 use crate::store::objects::jobs::Outcome;
+use crate::store::prepared::CacheOutcome;
 
 /// Media type of [`Metrics::text`].
 pub const CONTENT_TYPE: &str = "text/plain; version=0.0.4; charset=utf-8";
@@ -129,12 +130,12 @@ impl Metrics {
         }
     }
 
-    /// Counts an answer by the outcome in its `Cache-Status`.
-    pub fn cached(&self, cache_status: &str) {
-        let outcome = match cache_status {
-            "gramian; hit" => "hit",
-            _ if cache_status.ends_with("collapsed") => "collapsed",
-            _ => "miss",
+    /// Counts an answer by the origin of its models.
+    pub fn cached(&self, outcome: CacheOutcome) {
+        let outcome = match outcome {
+            CacheOutcome::Hit => "hit",
+            CacheOutcome::Collapsed => "collapsed",
+            CacheOutcome::Stored | CacheOutcome::NotStored => "miss",
         };
         self.cache_requests.with_label_values(&[outcome]).inc();
     }

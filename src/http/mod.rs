@@ -113,7 +113,9 @@ fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
         .routes(routes!(pages::list_problem_pages))
         .routes(routes!(pages::get_problem_page));
     let (v1, mut document) = v1.split_for_parts();
-    let (probes, of_probes) = probes.split_for_parts();
+    let (probes, mut of_probes) = probes.split_for_parts();
+    openapi::set_security(&mut document, true);
+    openapi::set_security(&mut of_probes, false);
     document.merge(of_probes);
     openapi::complete(&mut document);
     (v1, probes, document)

@@ -19,6 +19,7 @@ use crate::http::problem::slug::Slug;
 use crate::http::state::app::App;
 use crate::http::wire::negotiation::{Format, Wanted};
 use crate::store::key::CloudId;
+use crate::store::prepared::CacheOutcome;
 
 /// Most bytes of a method and of a path that are logged, because clients may send any number.
 const LOGGED_METHOD_BYTES: usize = 32;
@@ -66,6 +67,9 @@ pub async fn name_and_log(State(app): State<Arc<App>>, mut request: Request, nex
     if let Some(problem) = response.extensions().get::<Problem>() {
         app.metrics.refused(problem.slug());
     }
+    if let Some(&outcome) = response.extensions().get::<CacheOutcome>() {
+        app.metrics.cached(outcome);
+    }
     let mut response = with_problem_document(response, &request_id);
     secure(response.headers_mut());
     if let Some(cloud) = cloud {
@@ -77,9 +81,6 @@ pub async fn name_and_log(State(app): State<Arc<App>>, mut request: Request, nex
     let duration_ms = under_way.answered(response.status()).as_secs_f64() * 1e3;
     let status = response.status().as_u16();
     let cache = response.headers().get("cache-status").and_then(|value| value.to_str().ok()).unwrap_or("-");
-    if cache != "-" {
-        app.metrics.cached(cache);
-    }
     let trace_id = span.trace_id();
     span.end(response.status(), response.headers());
     let key = response.extensions().get::<KeyName>().map_or("-", |name| &name.0);

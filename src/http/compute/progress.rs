@@ -90,9 +90,10 @@ impl Progress {
         let known = elapsed.zip(state.expected);
         let seconds_left = known.map(|(elapsed, expected)| {
             state.fraction = state.fraction.max(fraction(elapsed / expected.max(1e-6)));
-            match elapsed < TIMELY * expected {
-                true => expected - elapsed,
-                false => elapsed * (1.0 - state.fraction) / state.fraction,
+            if elapsed < TIMELY * expected {
+                expected - elapsed
+            } else {
+                elapsed * (1.0 - state.fraction) / state.fraction
             }
         });
         let State { stage, residual, fraction, .. } = *state;

@@ -4,7 +4,7 @@ use serde::Deserialize;
 use utoipa::ToSchema;
 
 use super::schemas::CloudIdSchema;
-use crate::http::wire::read::members::{present, present_unless_empty};
+use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
 
 /// A cloud, given by the id of a registered cloud or by its points. Exactly one of `id` and `points` is
@@ -13,17 +13,15 @@ use crate::http::wire::read::points::Points;
 #[serde(deny_unknown_fields)]
 pub struct CloudRef {
     /// The id of a registered cloud, 64 hexadecimal digits.
-    #[serde(default, deserialize_with = "present")]
-    #[schema(nullable = false, value_type = Option<CloudIdSchema>)]
+    #[schema(value_type = Option<CloudIdSchema>)]
     pub id: Option<String>,
     /// The points, with a row of coordinates each, all of the same length. The cloud is registered with the
     /// request.
-    #[serde(default, deserialize_with = "present")]
-    #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+    #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
     pub points: Option<Points>,
     /// Normals at the points, a row each, of any length but 0, with `points` only. They point to the outward
     /// side. An empty list counts as absent.
     #[serde(default, deserialize_with = "present_unless_empty")]
-    #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+    #[schema(value_type = Option<Vec<Vec<f64>>>)]
     pub normals: Option<Points>,
 }

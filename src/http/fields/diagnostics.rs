@@ -6,8 +6,7 @@ use utoipa::ToSchema;
 use super::hyperparameters::Hyperparameters;
 use super::kernel::KernelUsed;
 use super::schemas::CloudIdSchema;
-use crate::http::problem::Problem;
-use crate::http::wire::write::answer::{Member, Parts};
+use crate::http::wire::write::answer::json_members;
 use gramian_numerics::solver::{Disagreement, Outlier, Place};
 use gramian_numerics::surface::operators::{RowKind, Stencils};
 
@@ -107,47 +106,38 @@ pub struct Diagnostics {
     pub kernel: KernelUsed,
     /// The number added to the diagonal. Absent with `noise_variances`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub alpha: Option<f64>,
     /// The solver used.
     pub solver: SolverUsed,
     /// The reason why `auto` chose a solver other than the dense one. Absent otherwise.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub solver_reason: Option<String>,
     /// The factorization of the matrix.
     pub factorization: FactorizationUsed,
     /// Numerical rank of the matrix.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub rank: Option<usize>,
     /// Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): roughly the fraction of digits that survive.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub reciprocal_condition: Option<f64>,
     /// ‖Y − (K + αI)Λ‖/‖Y‖ of the solve, where Y is the values without their mean. For matrices and surfaces,
     /// Y = 1.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub relative_residual: Option<f64>,
     /// ‖u‖² = ΛᵀKΛ, the squared norm in the native space of the kernel.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub native_norm_squared: Option<f64>,
     /// The mean of the function: the constant, then a slope per coordinate if it is linear. Absent if the
     /// mean is 0.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub mean_coefficients: Option<Vec<f64>>,
     /// |u(X) − Y|, unit of the values.
     ///
     /// Absent for values from the local solver, which is not evaluated at the points.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub misfit: Option<f64>,
     /// Estimated standard deviation of the noise of the points across the surface, length.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub noise_deviation: Option<f64>,
     /// What local regressions learned of the cloud, or were given.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -161,13 +151,12 @@ pub struct Diagnostics {
     pub n_merged_duplicates: usize,
     /// Number of rows of a sparse operator by how their weights were computed.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub stencils: Option<StencilsUsed>,
     /// Changes that were made, and limits of the accuracy.
     pub warnings: Vec<Warning>,
     /// Diagnostics of the fit of the surface, in answers about values on a surface.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, no_recursion)]
+    #[schema(no_recursion)]
     pub geometry: Option<Box<Diagnostics>>,
 }
 
@@ -210,9 +199,7 @@ impl Diagnostics {
         );
         self.warnings.push(Warning { code: WarningCode::VarianceClamped, detail });
     }
-}
 
-impl Diagnostics {
     /// Warns that values contradict kernel and noise, and suggests a remedy.
     pub fn warn_of_misfit(&mut self, found: Disagreement, remedy: &str) {
         let spread = found.mean_square.sqrt();
@@ -231,9 +218,7 @@ impl Diagnostics {
         };
         self.warnings.push(Warning { code: WarningCode::Misfit, detail });
     }
-}
 
-impl Diagnostics {
     /// Warns that neighbourhoods are too small.
     ///
     /// `deviations` is by how many deviations values from half of a neighbourhood differ from those of all of
@@ -248,11 +233,7 @@ impl Diagnostics {
     }
 }
 
-impl Member for Diagnostics {
-    fn add_to(self, name: &'static str, parts: &mut Parts) -> Result<(), Problem> {
-        parts.add_json(name, &self)
-    }
-}
+json_members!(Diagnostics);
 
 /// The reason why a query is degenerate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]

@@ -7,7 +7,7 @@ use super::choices::{DuplicatePolicy, MeanChoice, SolverChoice, SurfaceChoice};
 use super::cloud_ref::CloudRef;
 use super::hyperparameters::Hyperparameters;
 use super::kernel::Kernel;
-use crate::http::wire::read::members::{present, present_object, present_unless_empty, present_word};
+use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
 
 /// The surface of an operator, if it differs from the surface of the request.
@@ -17,35 +17,30 @@ use crate::http::wire::read::points::Points;
 #[serde(deny_unknown_fields)]
 pub struct Geometry {
     /// The cloud whose level surface carries the operator.
-    #[serde(default, deserialize_with = "present_object")]
-    #[schema(nullable = false)]
     pub cloud: Option<CloudRef>,
     /// The kernel of the signature function of the surface.
-    #[serde(default, deserialize_with = "present_object")]
-    #[schema(nullable = false)]
     pub kernel: Option<Kernel>,
     /// Added to the diagonal of the Gram matrix of the surface.
-    #[serde(default, deserialize_with = "present")]
-    #[schema(nullable = false, minimum = 0.0)]
+    #[schema(minimum = 0.0)]
     pub alpha: Option<f64>,
     /// Noise variances of the surface, an entry per point of its cloud, instead of `alpha`. An empty list
     /// counts as absent.
     #[serde(default, deserialize_with = "present_unless_empty")]
-    #[schema(nullable = false)]
     pub noise_variances: Option<Vec<f64>>,
     /// The method that solves the linear system of the surface.
-    #[serde(default, deserialize_with = "present_word")]
-    #[schema(nullable = false)]
     pub solver: Option<SolverChoice>,
     /// The function whose level set is the surface.
-    #[serde(default, deserialize_with = "present_word")]
-    #[schema(nullable = false)]
     pub surface: Option<SurfaceChoice>,
 }
 
 /// A request about a cloud.
 pub trait HasCloud {
     fn cloud(&self) -> &CloudRef;
+
+    /// The cloud of the surface, where it may differ from that of the values.
+    fn surface_cloud(&self) -> Option<&CloudRef> {
+        None
+    }
 }
 
 /// The fields that determine a fit, moved out of a request.
@@ -65,45 +60,40 @@ pub struct Fit {
 }
 
 /// Declares a request. The fields of a fit and the request's own fields are members of the same object.
+///
+/// `with` names the field that holds the [`Geometry`] of the surface, where the request has one.
 macro_rules! request {
     (
         $(#[$meta:meta])*
-        pub struct $name:ident { $($(#[$field_meta:meta])* pub $field:ident: $type:ty,)* }
+        pub struct $name:ident $(with $geometry:ident)? {
+            $($(#[$field_meta:meta])* pub $field:ident: $type:ty,)*
+        }
     ) => {
         $(#[$meta])*
         #[derive(Debug, serde::Deserialize, utoipa::ToSchema)]
         #[serde(deny_unknown_fields)]
         pub struct $name {
             /// The points at which values are known, or that sample the surface.
-            #[serde(deserialize_with = "crate::http::wire::read::members::object")]
             pub cloud: $crate::http::fields::CloudRef,
             /// The kernel. If absent, it is chosen.
             ///
             /// A surface's kernel is chosen from the cloud. A kernel for values is chosen by their
             /// likelihood, together with its variance and, unless they are given, the noise and a constant
             /// mean. The diagnostics repeat all of it.
-            #[serde(default, deserialize_with = "crate::http::wire::read::members::present_object")]
-            #[schema(nullable = false)]
             pub kernel: Option<$crate::http::fields::Kernel>,
             /// Added to the diagonal of the Gram matrix as given, unit of the values squared.
             ///
             /// 0 interpolates, and the variance of the noise regresses. Default: 1e-10 if a kernel is given.
             /// Without a kernel, alpha is chosen. For values it is their noise by the likelihood. For
             /// surfaces it follows the noise of the points and is at least 1e-3.
-            #[serde(default, deserialize_with = "crate::http::wire::read::members::present")]
-            #[schema(nullable = false, minimum = 0.0)]
+            #[schema(minimum = 0.0)]
             pub alpha: Option<f64>,
             /// The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
             #[serde(default, deserialize_with = "crate::http::wire::read::members::present_unless_empty")]
-            #[schema(nullable = false)]
             pub noise_variances: Option<Vec<f64>>,
             /// The method that solves the linear system.
-            #[serde(default, deserialize_with = "crate::http::wire::read::members::present_word")]
-            #[schema(nullable = false)]
             pub solver: Option<$crate::http::fields::SolverChoice>,
             /// The treatment of points that coincide when alpha is 0.
-            #[serde(default, deserialize_with = "crate::http::wire::read::members::present_word")]
-            #[schema(nullable = false)]
             pub duplicates: Option<$crate::http::fields::DuplicatePolicy>,
             $($(#[$field_meta])* pub $field: $type,)*
         }
@@ -112,6 +102,10 @@ macro_rules! request {
             fn cloud(&self) -> &$crate::http::fields::CloudRef {
                 &self.cloud
             }
+
+            $(fn surface_cloud(&self) -> Option<&$crate::http::fields::CloudRef> {
+                self.$geometry.as_ref()?.cloud.as_ref()
+            })?
         }
 
         impl $name {

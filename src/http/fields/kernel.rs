@@ -5,8 +5,8 @@ use utoipa::ToSchema;
 
 use super::schemas::Smoothness;
 use crate::http::problem::{Pointers, Problem};
-use crate::http::wire::read::members::{present, present_unless_empty, word};
-use crate::http::wire::write::answer::{Member, Parts};
+use crate::http::wire::read::members::present_unless_empty;
+use crate::http::wire::write::answer::json_members;
 use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::kernel::{Family, Kernel as NumericalKernel, WendlandSmoothness};
 use gramian_numerics::patches::PatchKernel;
@@ -31,34 +31,27 @@ pub enum KernelFamily {
 #[serde(deny_unknown_fields)]
 pub struct Kernel {
     /// The family, which determines φ.
-    #[serde(deserialize_with = "word")]
     pub family: KernelFamily,
     /// The length scale ℓ, in the unit of the coordinates. Default: chosen from the cloud.
-    #[serde(default, deserialize_with = "present")]
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    #[schema(exclusive_minimum = 0.0)]
     pub length_scale: Option<f64>,
     /// A length scale per axis, in the units of the coordinates, instead of `length_scale`. An empty list
     /// counts as absent.
     #[serde(default, deserialize_with = "present_unless_empty")]
-    #[schema(nullable = false)]
     pub length_scales: Option<Vec<f64>>,
     /// The factor of φ, unit of the values squared. Default: 1.
-    #[serde(default, deserialize_with = "present")]
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    #[schema(exclusive_minimum = 0.0)]
     pub variance: Option<f64>,
     /// laplace: φ = exp(−√(r² + epsilon)). Default: 0, which leaves a kink at the points of the cloud.
-    #[serde(default, deserialize_with = "present")]
-    #[schema(nullable = false, minimum = 0.0)]
+    #[schema(minimum = 0.0)]
     pub epsilon: Option<f64>,
     /// matern: the smoothness ν, one of 0.5, 1.5, …, 8.5. Default: 2.5.
     ///
     /// The schema gives a range, because generators do not support enumerations of fractions.
-    #[serde(default, deserialize_with = "present")]
-    #[schema(nullable = false, minimum = 0.5, maximum = 8.5, multiple_of = 0.5)]
+    #[schema(minimum = 0.5, maximum = 8.5, multiple_of = 0.5)]
     pub nu: Option<f64>,
     /// wendland: 2, 4 or 6 times differentiable. Default: 4.
-    #[serde(default, deserialize_with = "present")]
-    #[schema(nullable = false, value_type = Option<Smoothness>)]
+    #[schema(value_type = Option<Smoothness>)]
     pub smoothness: Option<u8>,
 }
 
@@ -69,25 +62,21 @@ pub struct KernelUsed {
     pub family: KernelFamily,
     /// The length scale ℓ, in the unit of the coordinates. Absent if each axis has its own.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub length_scale: Option<f64>,
     /// The length scale of each axis, if each has its own.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub length_scales: Option<Vec<f64>>,
     /// The factor of φ, unit of the values squared.
     pub variance: f64,
     /// laplace: φ = exp(−√(r² + epsilon)).
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub epsilon: Option<f64>,
     /// matern: the smoothness ν.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub nu: Option<f64>,
     /// wendland: how many times the kernel is differentiable.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, value_type = Option<Smoothness>)]
+    #[schema(value_type = Option<Smoothness>)]
     pub smoothness: Option<u8>,
 }
 
@@ -192,11 +181,7 @@ impl Kernel {
     }
 }
 
-impl Member for KernelUsed {
-    fn add_to(self, name: &'static str, parts: &mut Parts) -> Result<(), Problem> {
-        parts.add_json(name, &self)
-    }
-}
+json_members!(KernelUsed);
 
 impl KernelUsed {
     /// The kernel of the heights of local regressions: Matérn with ν = 9/2.
@@ -212,9 +197,7 @@ impl KernelUsed {
             smoothness: None,
         }
     }
-}
 
-impl KernelUsed {
     /// A kernel whose variance is multiplied by a factor.
     pub fn scaled(kernel: &NumericalKernel, factor: f64) -> Self {
         let used = Self::from(kernel);

@@ -20,7 +20,7 @@ use crate::http::state::jobs::LocalJob;
 use crate::http::state::kept::SECONDS_UNTIL_COUNTED;
 use crate::http::wire::write::json::Json;
 use crate::store::Owner;
-use crate::store::objects::jobs::{Claim, ClaimName, JobId, JobRequest};
+use crate::store::objects::jobs::{Claim, ClaimName, JobId, JobRequest, NewJob};
 
 const PREFER: HeaderName = HeaderName::from_static("prefer");
 const PREFERENCE_APPLIED: HeaderName = HeaderName::from_static("preference-applied");
@@ -134,7 +134,8 @@ impl Asked {
             return Err(app.jobs.kept.refused(owner, reason));
         };
         let name = app.keys.name_of(owner);
-        let written = app.jobs.objects.put_job((&name, id), &self.request, self.body.clone(), &mut room);
+        let job = NewJob { id, request: &self.request, body: self.body.clone() };
+        let written = app.jobs.objects.put_job(&name, job, &mut room);
         written.await.map_err(|error| unavailable(&error))?;
         app.jobs.kept.pay(id, room.into_reservation());
         Ok(entered)

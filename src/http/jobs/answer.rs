@@ -5,13 +5,13 @@ use std::time::{Duration, Instant};
 
 use axum::body::Body;
 use axum::extract::Request;
-use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
+use axum::http::{HeaderName, Method, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use futures_util::TryStreamExt;
 use tower::ServiceExt;
 
-use super::Runner;
 use super::run::Attempt;
+use super::{Runner, restore_headers};
 use crate::http::around::middleware::{CLOUD_HEADER, with_problem_document};
 use crate::http::around::span::RequestSpan;
 use crate::http::problem::Problem;
@@ -21,6 +21,7 @@ use crate::store::objects::jobs::{Answer, FoundRequest, JobResult, Outcome};
 use crate::store::objects::pieces::BrokenOff;
 use crate::store::objects::room::Room;
 use crate::store::objects::{OwnerName, Unavailable};
+use crate::store::prepared::CacheOutcome;
 
 /// Most attempts that may crash their process. Without a limit, a fatal request would crash every process in
 /// turn.
@@ -38,6 +39,14 @@ static KEPT_HEADERS: [HeaderName; 5] = [
     CLOUD_HEADER,
 ];
 
+/// A job that this process runs: an attempt at it, for an owner of this name.
+#[derive(Clone, Copy)]
+struct Run<'a> {
+    here: &'a LocalJob,
+    name: &'a OwnerName,
+    attempt: &'a Attempt,
+}
+
 /// Trace id of an answer.
 #[derive(Clone)]
 struct Trace(String);
@@ -52,9 +61,10 @@ impl Runner {
     ) -> Result<(), Unavailable> {
         let began = Instant::now();
         let app = &self.app;
+        let run = Run { here, name, attempt };
         if attempt.lease.n_crashes >= MAX_CRASHES {
             tracing::error!(job = %here.id, "a job ended its process several times, and is given up");
-            return self.write(here, name, attempt, Problem::internal().into_response()).await;
+            return self.write(run, Problem::internal().into_response()).await;
         }
         let within = app.config.job_seconds;
         let answering = self.response(here, name);
@@ -69,9 +79,12 @@ impl Runner {
         if let Some(problem) = response.extensions().get::<Problem>() {
             app.metrics.refused(problem.slug());
         }
+        if let Some(&outcome) = response.extensions().get::<CacheOutcome>() {
+            app.metrics.cached(outcome);
+        }
         let trace_id =
             response.extensions().get::<Trace>().map_or_else(|| "-".to_owned(), |trace| trace.0.clone());
-        self.write(here, name, attempt, response).await?;
+        self.write(run, response).await?;
         let duration_ms = began.elapsed().as_secs_f64() * 1e3;
         tracing::info!(job = %here.id, trace_id, status, duration_ms, "job {} {status}", here.id);
         Ok(())
@@ -122,20 +135,14 @@ impl Runner {
     }
 
     /// Writes the answer as the result of the job.
-    async fn write(
-        &self,
-        here: &LocalJob,
-        name: &OwnerName,
-        attempt: &Attempt,
-        response: Response,
-    ) -> Result<(), Unavailable> {
-        let jobs = &self.app.jobs;
+    async fn write(&self, run: Run<'_>, response: Response) -> Result<(), Unavailable> {
+        let (jobs, here) = (&self.app.jobs, run.here);
         let Some(mut room) = jobs.room(here.owner, 0) else {
-            return self.write_refusal(here, name, attempt).await;
+            return self.write_refusal(run).await;
         };
-        let written = self.write_in(&mut room, here, (name, attempt), response).await;
+        let written = self.write_in(&mut room, run, response).await;
         if room.is_exceeded() {
-            return self.write_refusal(here, name, attempt).await;
+            return self.write_refusal(run).await;
         }
         if let Some(outcome) = written? {
             self.app.metrics.job_ended(outcome);
@@ -146,17 +153,11 @@ impl Runner {
 
     /// Makes a refusal the result of a job whose answer found no room. The refusal is small, and is not
     /// counted.
-    async fn write_refusal(
-        &self,
-        here: &LocalJob,
-        name: &OwnerName,
-        attempt: &Attempt,
-    ) -> Result<(), Unavailable> {
+    async fn write_refusal(&self, run: Run<'_>) -> Result<(), Unavailable> {
         let response = self.app.jobs.too_large().into_response();
-        let written = self.write_in(&mut Room::unlimited(), here, (name, attempt), response).await?;
-        if let Some(outcome) = written {
+        if let Some(outcome) = self.write_in(&mut Room::unlimited(), run, response).await? {
             self.app.metrics.job_ended(outcome);
-            self.app.jobs.kept.end(here.id, here.owner, None);
+            self.app.jobs.kept.end(run.here.id, run.here.owner, None);
         }
         Ok(())
     }
@@ -165,15 +166,15 @@ impl Runner {
     async fn write_in(
         &self,
         room: &mut Room,
-        here: &LocalJob,
-        (name, attempt): (&OwnerName, &Attempt),
+        run: Run<'_>,
         response: Response,
     ) -> Result<Option<Outcome>, Unavailable> {
+        let Run { here, name, attempt } = run;
         let response = with_problem_document(response, &here.id.to_string());
         let (head, body) = (head_of(&response), response.into_body().into_data_stream());
         let outcome = head.outcome;
         let answer = Answer { attempt: attempt.number, head, body };
-        let is_result = self.app.jobs.objects.put_result((name, here.id), answer, room).await?;
+        let is_result = self.app.jobs.objects.put_result(name, here.id, answer, room).await?;
         Ok(is_result.then_some(outcome))
     }
 }
@@ -199,12 +200,7 @@ fn rebuilt(found: FoundRequest, here: &LocalJob, fault: &Arc<OnceLock<BrokenOff>
     if let Ok(uri) = request.path.parse() {
         *rebuilt.uri_mut() = uri;
     }
-    for (name, value) in &request.headers {
-        if let (Ok(name), Ok(value)) = (HeaderName::from_bytes(name.as_bytes()), HeaderValue::from_str(value))
-        {
-            rebuilt.headers_mut().insert(name, value);
-        }
-    }
+    restore_headers(rebuilt.headers_mut(), &request.headers);
     rebuilt.extensions_mut().insert(here.owner);
     rebuilt
 }

@@ -15,6 +15,7 @@ use crate::http::serve::durable::unavailable;
 use crate::http::state::app::App;
 use crate::http::state::jobs::LocalJob;
 use crate::http::state::kept::is_older;
+use crate::http::wire::write::json::timestamp;
 use crate::store::Owner;
 use crate::store::objects::OwnerName;
 use crate::store::objects::jobs::{FoundResult, JobId, JobObjects, JobResult, Lease, Outcome};
@@ -53,11 +54,11 @@ pub struct ProgressView {
     fraction: f64,
     /// Relative residual of the last solve. Absent before there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, minimum = 0.0)]
+    #[schema(minimum = 0.0)]
     residual: Option<f64>,
     /// Seconds until the job is done, predicted from what ran on this machine. Absent while unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, minimum = 0.0)]
+    #[schema(minimum = 0.0)]
     seconds_left: Option<f64>,
 }
 
@@ -77,23 +78,24 @@ pub struct JobView {
     created_at: String,
     /// The time at which the job ended, in UTC. Absent before.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, format = DateTime)]
+    #[schema(format = DateTime)]
     ended_at: Option<String>,
     /// The time until which the result is kept, in UTC. Absent before there is a result.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, format = DateTime)]
+    #[schema(format = DateTime)]
     expires_at: Option<String>,
     /// The problem that made the job fail, and that the request would have been answered with.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, value_type = Option<crate::http::problem::ProblemDocument<'static>>)]
+    #[schema(value_type = Option<crate::http::problem::ProblemDocument<'static>>)]
     problem: Option<Value>,
 }
 
 /// Describes a job of this process from what the process knows.
 pub fn view_of_here(here: &LocalJob) -> JobView {
-    let (status, progress) = match here.has_lease() {
-        true => (Status::Running, of_snapshot(here.progress.now())),
-        false => (Status::Queued, at("queued", 0.0)),
+    let (status, progress) = if here.has_lease() {
+        (Status::Running, of_snapshot(here.progress.now()))
+    } else {
+        (Status::Queued, at("queued", 0.0))
     };
     view(here.id, status, progress)
 }
@@ -205,8 +207,8 @@ async fn view_of_result(app: &App, id: JobId, found: FoundResult) -> Result<JobV
     };
     let fraction = if outcome == Outcome::Succeeded { 1.0 } else { 0.0 };
     let mut view = view(id, status, at("done", fraction));
-    view.ended_at = Some(written(ended_at));
-    view.expires_at = Some(written(ended_at + app.config.job_result()));
+    view.ended_at = Some(timestamp(ended_at));
+    view.expires_at = Some(timestamp(ended_at + app.config.job_result()));
     if outcome == Outcome::Failed {
         view.problem = Some(problem_of(found).await?);
     }
@@ -214,7 +216,7 @@ async fn view_of_result(app: &App, id: JobId, found: FoundResult) -> Result<JobV
 }
 
 fn view(id: JobId, status: Status, progress: ProgressView) -> JobView {
-    let created_at = written(id.created_at());
+    let created_at = timestamp(id.created_at());
     JobView {
         job_id: id.to_string(),
         status,
@@ -224,10 +226,6 @@ fn view(id: JobId, status: Status, progress: ProgressView) -> JobView {
         expires_at: None,
         problem: None,
     }
-}
-
-fn written(time: SystemTime) -> String {
-    humantime::format_rfc3339_millis(time).to_string()
 }
 
 fn at(stage: &str, fraction: f64) -> ProgressView {

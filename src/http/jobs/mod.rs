@@ -30,6 +30,7 @@ mod run;
 use std::sync::Arc;
 
 use axum::Router;
+use axum::http::{HeaderMap, HeaderName, HeaderValue};
 
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
@@ -43,6 +44,16 @@ pub use look::{JobView, Status, find_known, look, look_until_ended, problem_of};
 pub struct Runner {
     pub app: Arc<App>,
     pub routes: Router,
+}
+
+/// Inserts headers of a request or an answer that was kept as text.
+pub fn restore_headers(headers: &mut HeaderMap, kept: &[(String, String)]) {
+    for (name, value) in kept {
+        if let (Ok(name), Ok(value)) = (HeaderName::from_bytes(name.as_bytes()), HeaderValue::from_str(value))
+        {
+            headers.insert(name, value);
+        }
+    }
 }
 
 /// 404 for an unknown job.

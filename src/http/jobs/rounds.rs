@@ -166,7 +166,7 @@ mod tests {
     use crate::config::Config;
     use crate::http::state::app::App;
     use crate::store::objects::Verb;
-    use crate::store::objects::jobs::{Answer, JobRequest, JobResult, Outcome};
+    use crate::store::objects::jobs::{Answer, JobRequest, JobResult, NewJob, Outcome};
     use crate::store::objects::room::Room;
 
     #[derive(Parser)]
@@ -190,7 +190,8 @@ mod tests {
         async fn put_job(&self) -> JobId {
             let (id, room) = (JobId::new(), &mut Room::unlimited());
             let request = JobRequest { path: "/v1/normals".to_owned(), headers: Vec::new() };
-            self.app.jobs.objects.put_job((&self.name(), id), &request, Bytes::new(), room).await.unwrap();
+            let job = NewJob { id, request: &request, body: Bytes::new() };
+            self.app.jobs.objects.put_job(&self.name(), job, room).await.unwrap();
             id
         }
 
@@ -199,7 +200,7 @@ mod tests {
             let body = stream::iter([Ok::<_, String>(Bytes::from_static(b"{}"))]);
             let answer = Answer { attempt: 0, head, body };
             let objects = &self.app.jobs.objects;
-            assert!(objects.put_result((&self.name(), id), answer, &mut Room::unlimited()).await.unwrap());
+            assert!(objects.put_result(&self.name(), id, answer, &mut Room::unlimited()).await.unwrap());
         }
 
         /// Lists that a round asks for, and the jobs that it finds open.

@@ -7,12 +7,13 @@ pub mod examples;
 mod formats;
 mod headers;
 mod links;
+mod optional;
 pub mod responses;
 
 use serde_json::Value;
 use utoipa::openapi::RefOr;
 use utoipa::openapi::path::{Operation, PathItem};
-use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityScheme};
+use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme};
 use utoipa::{Modify, OpenApi};
 
 use super::problem::ProblemDocument;
@@ -59,6 +60,15 @@ impl Modify for BearerKeys {
     }
 }
 
+/// Declares whether operations take a key. Where no keys are configured, they do without.
+pub fn set_security(document: &mut utoipa::openapi::OpenApi, takes_key: bool) {
+    let mut security = vec![SecurityRequirement::default()];
+    if takes_key {
+        security.push(SecurityRequirement::new::<_, [&str; 0], &str>("bearer", []));
+    }
+    operations(document).for_each(|operation| operation.security = Some(security.clone()));
+}
+
 /// Completes the document that the routes declare.
 pub fn complete(document: &mut utoipa::openapi::OpenApi) {
     formats::add(document);
@@ -66,6 +76,7 @@ pub fn complete(document: &mut utoipa::openapi::OpenApi) {
     headers::add(document);
     links::add(document);
     empty_answers_to_head(document);
+    optional::refuse_null(document);
 }
 
 /// Removes the bodies of answers to HEAD, which has none, whatever the problem.

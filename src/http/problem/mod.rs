@@ -69,7 +69,6 @@ pub struct ProblemDocument<'a> {
     errors: &'a [FieldError],
     /// An alpha for which the computation succeeds, unit of the values squared.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     minimum_alpha: Option<f64>,
     /// The points in question, as positions in the cloud. At most the first 1,000.
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
@@ -77,11 +76,9 @@ pub struct ProblemDocument<'a> {
     point_indices: &'a [usize],
     /// The limit that was exceeded, in the unit that `detail` names.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     limit: Option<u64>,
     /// The size that the request would have needed, in the unit of `limit`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     required: Option<u64>,
 }
 
@@ -162,27 +159,24 @@ impl Problem {
 
     /// 503 if no place, memory or thread is free.
     pub fn overloaded(retry_after_seconds: u64) -> Self {
-        let detail =
-            format!("all that can be served at once is being served; try again in {retry_after_seconds} s");
-        let mut problem = Self::new(Slug::Overloaded, detail);
-        problem.members.retry_after_seconds = Some(retry_after_seconds);
-        problem
+        Self::unavailable("all that can be served at once is being served", retry_after_seconds)
     }
 
     /// 429 beyond a limit of the key.
     pub fn rate_limited(limit: &str, retry_after_seconds: u64) -> Self {
         let detail = format!("this key may make {limit}; try again in {retry_after_seconds} s");
-        let mut problem = Self::new(Slug::RateLimited, detail);
-        problem.members.retry_after_seconds = Some(retry_after_seconds);
-        problem
+        Self::new(Slug::RateLimited, detail).retry_after(retry_after_seconds)
     }
 
     /// 503 for another reason than a full queue.
     pub fn unavailable(reason: &str, retry_after_seconds: u64) -> Self {
         let detail = format!("{reason}; try again in {retry_after_seconds} s");
-        let mut problem = Self::new(Slug::Overloaded, detail);
-        problem.members.retry_after_seconds = Some(retry_after_seconds);
-        problem
+        Self::new(Slug::Overloaded, detail).retry_after(retry_after_seconds)
+    }
+
+    fn retry_after(mut self, seconds: u64) -> Self {
+        self.members.retry_after_seconds = Some(seconds);
+        self
     }
 
     /// 503 of a process that is shutting down.
@@ -275,10 +269,9 @@ impl Problem {
                 Self::new(Slug::InvalidRequest, format!("{detail}; scale the values or the length scale"))
             }
             E::OutOfMemory { .. } => {
-                let mut problem =
+                let problem =
                     Self::new(Slug::Overloaded, format!("{detail}; try again when less is computed"));
-                problem.members.retry_after_seconds = Some(RETRY_AFTER_MEMORY_SECONDS);
-                problem
+                problem.retry_after(RETRY_AFTER_MEMORY_SECONDS)
             }
             E::MeanNotDetermined => at(Slug::InvalidRequest, "/mean"),
             E::WeightsOverflow => at(Slug::InvalidRequest, "/values"),

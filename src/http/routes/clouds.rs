@@ -24,7 +24,7 @@ use crate::http::state::app::App;
 use crate::http::wire::negotiation::Format;
 use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
-use crate::http::wire::write::json::Json;
+use crate::http::wire::write::json::{Json, timestamp};
 use crate::store::Owner;
 use crate::store::clouds::{CloudPage, ListedCloud, RegisteredCloud};
 use crate::store::key::CloudId;
@@ -49,7 +49,7 @@ pub struct CloudRequest {
     ///
     /// They may have any length but 0. The side they point to is outward. An empty list counts as absent.
     #[serde(default, deserialize_with = "present_unless_empty")]
-    #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+    #[schema(value_type = Option<Vec<Vec<f64>>>)]
     pub normals: Option<Points>,
 }
 
@@ -90,7 +90,6 @@ pub struct Cloud {
     /// Absent if all points coincide. A list of clouds has it only once a kernel was chosen for the cloud, or
     /// the cloud was registered or described by itself.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     spacing: Option<Spacing>,
     /// Number of points that coincide with an earlier point.
     n_duplicates: usize,
@@ -118,7 +117,7 @@ impl Cloud {
             bounding_box: BoundingBox { min, max },
             spacing: None,
             n_duplicates: head.n_duplicates,
-            created_at: written(head.created_at),
+            created_at: timestamp(head.created_at),
         }
     }
 }
@@ -132,10 +131,6 @@ impl From<ListedCloud> for Cloud {
     }
 }
 
-fn written(time: SystemTime) -> String {
-    humantime::format_rfc3339_millis(time).to_string()
-}
-
 /// A page of clouds, oldest first.
 #[derive(Serialize, ToSchema)]
 pub struct CloudList {
@@ -143,7 +138,7 @@ pub struct CloudList {
     clouds: Vec<Cloud>,
     /// The cursor of the next page. Absent on the last page.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, value_type = Option<CursorSchema>)]
+    #[schema(value_type = Option<CursorSchema>)]
     next: Option<String>,
 }
 
@@ -155,15 +150,13 @@ pub struct CloudList {
 #[utoipa::path(
     post,
     path = "/v1/clouds",
-    operation_id = "create_cloud",
     tag = "clouds",
     request_body = CloudRequest,
     responses(
         (status = 201, description = "Registered", body = Cloud),
         (status = 200, description = "Known already", body = Cloud),
         RegisterProblems
-    ),
-    security((), ("bearer" = []))
+    )
 )]
 pub async fn create_cloud(
     State(app): State<Arc<App>>,
@@ -206,15 +199,13 @@ pub async fn create_cloud(
 #[utoipa::path(
     get,
     path = "/v1/clouds/{cloud_id}",
-    operation_id = "get_cloud",
     tag = "clouds",
     params(("cloud_id" = CloudIdSchema, Path, description = "The id of a registered cloud", example = "bd711900da5366ee5d24b56f902cd7e737e487987d5285c2791b2955e124c69c")),
     responses(
         (status = 200, description = "The cloud", body = Cloud),
         (status = 304, description = "The client has it already"),
         DescribeProblems
-    ),
-    security((), ("bearer" = []))
+    )
 )]
 pub async fn get_cloud(
     State(app): State<Arc<App>>,
@@ -252,11 +243,9 @@ async fn describe(
 #[utoipa::path(
     head,
     path = "/v1/clouds/{cloud_id}",
-    operation_id = "check_cloud",
     tag = "clouds",
     params(("cloud_id" = CloudIdSchema, Path, description = "The id of a registered cloud", example = "bd711900da5366ee5d24b56f902cd7e737e487987d5285c2791b2955e124c69c")),
-    responses((status = 200, description = "Registered"), (status = 304, description = "The client has it already"), LookUpProblems),
-    security((), ("bearer" = []))
+    responses((status = 200, description = "Registered"), (status = 304, description = "The client has it already"), LookUpProblems)
 )]
 pub async fn check_cloud(
     State(app): State<Arc<App>>,
@@ -279,11 +268,9 @@ pub async fn check_cloud(
 #[utoipa::path(
     delete,
     path = "/v1/clouds/{cloud_id}",
-    operation_id = "delete_cloud",
     tag = "clouds",
     params(("cloud_id" = CloudIdSchema, Path, description = "The id of a registered cloud", example = "bd711900da5366ee5d24b56f902cd7e737e487987d5285c2791b2955e124c69c")),
-    responses((status = 204, description = "Deleted"), LookUpProblems),
-    security((), ("bearer" = []))
+    responses((status = 204, description = "Deleted"), LookUpProblems)
 )]
 pub async fn delete_cloud(
     State(app): State<Arc<App>>,
@@ -291,9 +278,10 @@ pub async fn delete_cloud(
     Path(cloud_id): Path<String>,
 ) -> Result<StatusCode, Problem> {
     let id = CloudId::parse(&cloud_id).ok_or_else(|| unknown_cloud(&cloud_id))?;
-    match forget_cloud(&app, owner, id).await? {
-        true => Ok(StatusCode::NO_CONTENT),
-        false => Err(unknown_cloud(&cloud_id)),
+    if forget_cloud(&app, owner, id).await? {
+        Ok(StatusCode::NO_CONTENT)
+    } else {
+        Err(unknown_cloud(&cloud_id))
     }
 }
 
@@ -303,14 +291,12 @@ pub async fn delete_cloud(
 #[utoipa::path(
     get,
     path = "/v1/clouds",
-    operation_id = "list_clouds",
     tag = "clouds",
     params(
         ("limit" = Option<usize>, Query, description = "Clouds in a page, 50 if absent", minimum = 1, maximum = 1000, example = 10),
         ("cursor" = Option<CursorSchema>, Query, description = "`next` of the page before")
     ),
-    responses((status = 200, description = "A page of clouds", body = CloudList), ListProblems),
-    security((), ("bearer" = []))
+    responses((status = 200, description = "A page of clouds", body = CloudList), ListProblems)
 )]
 pub async fn list_clouds(
     State(app): State<Arc<App>>,

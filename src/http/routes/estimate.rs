@@ -27,7 +27,7 @@ use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
 use crate::http::routes::clouds::CloudRequest;
 use crate::http::serve::intake::{ReceivedBody, read_body};
-use crate::http::serve::operation::{self, Operation, REQUEST_FORMATS};
+use crate::http::serve::operation::{self, Named, REQUEST_FORMATS};
 use crate::http::state::app::App;
 use crate::http::wire::read::body::UnpackedBody;
 use crate::http::wire::read::limits::ParseContext;
@@ -106,11 +106,9 @@ pub struct EstimateResponse {
 #[utoipa::path(
     post,
     path = "/v1/estimate",
-    operation_id = "estimate",
     tag = "process",
     request_body = EstimateRequest,
-    responses((status = 200, description = "The estimate", body = EstimateResponse), ComputeProblems),
-    security((), ("bearer" = []))
+    responses((status = 200, description = "The estimate", body = EstimateResponse), ComputeProblems)
 )]
 pub async fn estimate(
     State(app): State<Arc<App>>,
@@ -142,7 +140,7 @@ fn name_of(
 macro_rules! operations {
     ($($request:ty),* $(,)?) => {
         /// Names of all operations that can be estimated.
-        pub const NAMES: &[&str] = &[$(<$request as Operation>::NAME),*];
+        pub const NAMES: &[&str] = &[$(<$request as Named>::NAME),*];
 
         async fn estimate_of(
             operation: &str,
@@ -150,9 +148,9 @@ macro_rules! operations {
             admission: &Arc<Admission>,
             intake: ReceivedBody,
         ) -> Result<Json<EstimateResponse>, Problem> {
-            $(if operation == <$request as Operation>::NAME {
+            $(if operation == <$request as Named>::NAME {
                 let estimate = operation::estimate::<$request>(app, admission, intake).await?;
-                return Ok(EstimateResponse::of(<$request as Operation>::NAME, estimate));
+                return Ok(EstimateResponse::of(<$request as Named>::NAME, estimate));
             })*
             let detail = format!("no operation of this name can be estimated; there are {}", NAMES.join(", "));
             Err(Problem::invalid_request("/operation", detail))
@@ -164,7 +162,7 @@ macro_rules! operations {
         /// # Errors
         /// Returns the problem that the request would be refused with.
         pub fn read_as(operation: &str, body: &UnpackedBody, context: &ParseContext<'_>) -> Result<(), Problem> {
-            $(if operation == <$request as Operation>::NAME {
+            $(if operation == <$request as Named>::NAME {
                 return body.parse::<$request>(context).map(drop);
             })*
             body.parse::<CloudRequest>(context).map(drop)

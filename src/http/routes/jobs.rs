@@ -7,14 +7,16 @@ use std::time::Duration;
 use axum::Extension;
 use axum::body::Body;
 use axum::extract::{Path, State};
-use axum::http::{HeaderName, HeaderValue, StatusCode, header};
+use axum::http::{StatusCode, header};
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use futures_util::Stream;
 
 use crate::http::around::middleware::Documented;
 use crate::http::fields::schemas::JobIdSchema;
-use crate::http::jobs::{JobView, find_known, look, look_until_ended, problem_of, unknown_job};
+use crate::http::jobs::{
+    JobView, find_known, look, look_until_ended, problem_of, restore_headers, unknown_job,
+};
 use crate::http::openapi::responses::{AnyJobProblems, JobProblems, JobResultProblems};
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
@@ -43,11 +45,9 @@ const BYTES_UNDER_WAY: usize = 256 << 10;
 #[utoipa::path(
     get,
     path = "/v1/jobs/{job_id}",
-    operation_id = "get_job",
     tag = "jobs",
     params(("job_id" = JobIdSchema, Path, description = "The id of a job", example = "0193a5e7-8c1d-7b22-9f0e-5d3c6f1a2b4c")),
-    responses((status = 200, description = "The job", body = JobView), JobProblems),
-    security((), ("bearer" = []))
+    responses((status = 200, description = "The job", body = JobView), JobProblems)
 )]
 pub async fn get_job(
     State(app): State<Arc<App>>,
@@ -63,11 +63,9 @@ pub async fn get_job(
 #[utoipa::path(
     delete,
     path = "/v1/jobs/{job_id}",
-    operation_id = "delete_job",
     tag = "jobs",
     params(("job_id" = JobIdSchema, Path, description = "The id of a job", example = "0193a5e7-8c1d-7b22-9f0e-5d3c6f1a2b4c")),
-    responses((status = 204, description = "Cancelled or forgotten"), AnyJobProblems),
-    security((), ("bearer" = []))
+    responses((status = 204, description = "Cancelled or forgotten"), AnyJobProblems)
 )]
 pub async fn delete_job(
     State(app): State<Arc<App>>,
@@ -93,11 +91,9 @@ pub async fn delete_job(
 #[utoipa::path(
     get,
     path = "/v1/jobs/{job_id}/events",
-    operation_id = "follow_job",
     tag = "jobs",
     params(("job_id" = JobIdSchema, Path, description = "The id of a job", example = "0193a5e7-8c1d-7b22-9f0e-5d3c6f1a2b4c")),
-    responses((status = 200, description = "The events", body = String, content_type = "text/event-stream"), AnyJobProblems),
-    security((), ("bearer" = []))
+    responses((status = 200, description = "The events", body = String, content_type = "text/event-stream"), AnyJobProblems)
 )]
 pub async fn follow_job(
     State(app): State<Arc<App>>,
@@ -160,7 +156,6 @@ async fn further(app: &App, owner: Owner, id: JobId, last: &JobView) -> Option<J
 #[utoipa::path(
     get,
     path = "/v1/jobs/{job_id}/result",
-    operation_id = "get_job_result",
     tag = "jobs",
     params(("job_id" = JobIdSchema, Path, description = "The id of a job", example = "0193a5e7-8c1d-7b22-9f0e-5d3c6f1a2b4c")),
     responses(
@@ -170,8 +165,7 @@ async fn further(app: &App, owner: Owner, id: JobId, last: &JobView) -> Option<J
             (String = "application/x-npy"),
         )),
         JobResultProblems
-    ),
-    security((), ("bearer" = []))
+    )
 )]
 pub async fn get_job_result(
     State(app): State<Arc<App>>,
@@ -210,12 +204,7 @@ pub async fn get_job_result(
     let n_bytes = usize::try_from(found.n_body_bytes).unwrap_or(usize::MAX).min(BYTES_UNDER_WAY);
     let memory = app.prepared.try_reserve(owner, n_bytes).ok_or_else(|| app.compute.out_of_memory())?;
     let mut response = Body::from_stream(holding(found.body, memory)).into_response();
-    for (name, value) in &found.head.headers {
-        if let (Ok(name), Ok(value)) = (HeaderName::from_bytes(name.as_bytes()), HeaderValue::from_str(value))
-        {
-            response.headers_mut().insert(name, value);
-        }
-    }
+    restore_headers(response.headers_mut(), &found.head.headers);
     response.headers_mut().insert(header::CONTENT_LENGTH, found.n_body_bytes.into());
     Ok(response)
 }

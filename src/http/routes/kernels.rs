@@ -34,7 +34,6 @@ pub struct KernelDescription {
     parameters: Vec<KernelParameter>,
     /// The largest dimension in which the kernel is positive definite. Absent if there is no limit.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     max_dimension: Option<usize>,
     /// The condition under which the kernel has derivatives at the points of the cloud.
     ///
@@ -55,10 +54,8 @@ pub struct KernelList {
 #[utoipa::path(
     get,
     path = "/v1/kernels",
-    operation_id = "list_kernels",
     tag = "values",
-    responses((status = 200, description = "All families", body = KernelList), ReadProblems),
-    security((), ("bearer" = []))
+    responses((status = 200, description = "All families", body = KernelList), ReadProblems)
 )]
 pub async fn list_kernels() -> Json<KernelList> {
     let always = "always";

@@ -5,6 +5,7 @@ pub mod estimate;
 mod gauges;
 pub mod jobs;
 pub mod kernels;
+mod operation;
 pub mod pages;
 pub mod process;
 pub mod reading;

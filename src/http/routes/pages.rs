@@ -17,10 +17,8 @@ use crate::http::problem::slug::Slug;
 #[utoipa::path(
     get,
     path = "/",
-    operation_id = "get_start_page",
     tag = "process",
-    responses((status = 200, description = "The page", body = String, content_type = "text/html"), ProbeProblems),
-    security(())
+    responses((status = 200, description = "The page", body = String, content_type = "text/html"), ProbeProblems)
 )]
 pub async fn get_start_page() -> Html<String> {
     let links = [
@@ -46,10 +44,8 @@ pub async fn get_start_page() -> Html<String> {
 #[utoipa::path(
     get,
     path = "/problems",
-    operation_id = "list_problem_pages",
     tag = "process",
-    responses((status = 200, description = "The list", body = String, content_type = "text/html"), ProbeProblems),
-    security(())
+    responses((status = 200, description = "The list", body = String, content_type = "text/html"), ProbeProblems)
 )]
 pub async fn list_problem_pages() -> Html<String> {
     let mut body = String::from("<dl>\n");
@@ -66,11 +62,9 @@ pub async fn list_problem_pages() -> Html<String> {
 #[utoipa::path(
     get,
     path = "/problems/{slug}",
-    operation_id = "get_problem_page",
     tag = "process",
     params(("slug" = String, Path, description = "The last segment of a problem's type", example = "duplicate-points")),
-    responses((status = 200, description = "The explanation", body = String, content_type = "text/html"), PageProblems),
-    security(())
+    responses((status = 200, description = "The explanation", body = String, content_type = "text/html"), PageProblems)
 )]
 pub async fn get_problem_page(Path(slug): Path<String>) -> Result<Html<String>, Problem> {
     let slug = Slug::parse(&slug).ok_or_else(|| Problem::new(Slug::NotFound, "no such problem type"))?;

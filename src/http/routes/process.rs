@@ -44,10 +44,8 @@ pub struct Version {
 #[utoipa::path(
     get,
     path = "/health/live",
-    operation_id = "check_live",
     tag = "process",
-    responses((status = 200, description = "It lives", body = Health), ProbeProblems),
-    security(())
+    responses((status = 200, description = "It lives", body = Health), ProbeProblems)
 )]
 pub async fn check_live() -> Json<Health> {
     Json(Health { status: "ok" })
@@ -64,10 +62,8 @@ pub async fn check_live() -> Json<Health> {
 #[utoipa::path(
     get,
     path = "/health/ready",
-    operation_id = "check_ready",
     tag = "process",
-    responses((status = 200, description = "It takes requests", body = Health), ReadyProblems),
-    security(())
+    responses((status = 200, description = "It takes requests", body = Health), ReadyProblems)
 )]
 pub async fn check_ready(State(app): State<Arc<App>>) -> Result<Json<Health>, Problem> {
     if app.draining.is_cancelled() {
@@ -88,10 +84,8 @@ pub async fn check_ready(State(app): State<Arc<App>>) -> Result<Json<Health>, Pr
 #[utoipa::path(
     get,
     path = "/metrics",
-    operation_id = "get_metrics",
     tag = "process",
-    responses((status = 200, description = "The metrics", body = String, content_type = "text/plain"), ProbeProblems),
-    security(())
+    responses((status = 200, description = "The metrics", body = String, content_type = "text/plain"), ProbeProblems)
 )]
 pub async fn get_metrics(State(app): State<Arc<App>>) -> Result<Response, Problem> {
     let text = gauges::gather(&app).and_then(|now| app.metrics.text(now)).map_err(|error| {
@@ -108,10 +102,8 @@ pub async fn get_metrics(State(app): State<Arc<App>>) -> Result<Response, Proble
 #[utoipa::path(
     get,
     path = "/version",
-    operation_id = "get_version",
     tag = "process",
-    responses((status = 200, description = "What is running", body = Version), ProbeProblems),
-    security(())
+    responses((status = 200, description = "What is running", body = Version), ProbeProblems)
 )]
 pub async fn get_version(State(app): State<Arc<App>>) -> Json<Version> {
     Json(Version {

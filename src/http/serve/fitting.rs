@@ -289,9 +289,10 @@ async fn prepare(
         return Ok(PreparedFit::restored(model, memory));
     }
     let flops = plan.price().at_most.flops;
-    let sampling = match plan.recipe.needs_sampling() {
-        true => sampling_unless_merged(&app, &admission, &plan).await?,
-        false => None,
+    let sampling = if plan.recipe.needs_sampling() {
+        sampling_unless_merged(&app, &admission, &plan).await?
+    } else {
+        None
     };
     let spare = app.prepared.spare().clone();
     let job = move |observer: &JobObserver| {

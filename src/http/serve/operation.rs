@@ -20,7 +20,7 @@ use super::report::AnswerHeaders;
 use super::sampling::find_lacking;
 use crate::config::Config;
 use crate::http::compute::{Admission, JobObserver, Work, is_light};
-use crate::http::fields::{CloudRef, HasCloud};
+use crate::http::fields::HasCloud;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::http::state::app::App;
@@ -34,11 +34,14 @@ use crate::store::clouds::RegisteredCloud;
 use crate::store::key::CloudId;
 use gramian_numerics::error::SolverKind;
 
-/// A request that needs a model.
-pub trait Operation: HasCloud + DeserializeOwned + Send + 'static {
+/// A request with the operation that it is sent to.
+pub trait Named {
     /// Operation id in the OpenAPI document.
     const NAME: &'static str;
+}
 
+/// A request that needs a model.
+pub trait Operation: Named + HasCloud + DeserializeOwned + Send + 'static {
     /// Inputs of `compute` that remain after the request is checked.
     type Work: Send + 'static;
     type Answer: Answer;
@@ -47,12 +50,7 @@ pub trait Operation: HasCloud + DeserializeOwned + Send + 'static {
     const FORMATS: &'static [Format] = &[Format::Json, Format::Safetensors];
 
     /// Whether the operation needs a surface: that of the plan's `surface`, or else of its `main` fit.
-    const HAS_SURFACE: bool;
-
-    /// The cloud of the surface, where it may differ from that of the values.
-    fn surface_cloud(&self) -> Option<&CloudRef> {
-        None
-    }
+    const HAS_SURFACE: bool = false;
 
     /// Checks everything that can be checked without computing, the cost included.
     ///
@@ -104,7 +102,8 @@ pub async fn serve<O: Operation>(app: Arc<App>, owner: Owner, request: Request) 
 
     let began = Instant::now();
     let parsed = |intake: ReceivedBody, app: &App, observer: &JobObserver| intake.parse::<O>(app, observer);
-    let plan = match prepare::<O>(&app, &admission, intake, parsed, Some(wanted), began).await? {
+    let call = Call { app: app.clone(), admission: admission.clone(), wanted: Some(wanted), began };
+    let plan = match prepare::<O>(&call, intake, parsed).await? {
         Prepared::Answered(answered, fresh) => {
             keep_all(&app, owner, &fresh).await;
             return Ok(answered.respond(&app, &admission));
@@ -112,7 +111,7 @@ pub async fn serve<O: Operation>(app: Arc<App>, owner: Owner, request: Request) 
         Prepared::Ready(plan) => plan,
     };
     let fresh = plan.fresh.clone();
-    let answering = compute::<O>(&app, &admission, plan, wanted, began);
+    let answering = compute::<O>(&call, plan, wanted);
     // The store receives new clouds while the answer is computed.
     let (answered, ()) = futures_util::future::join(answering, keep_all(&app, owner, &fresh)).await;
     Ok(answered?.respond(&app, &admission))
@@ -120,14 +119,12 @@ pub async fn serve<O: Operation>(app: Arc<App>, owner: Owner, request: Request) 
 
 /// Factorizes or finds, then computes and encodes.
 async fn compute<O: Operation>(
-    app: &Arc<App>,
-    admission: &Arc<Admission>,
+    call: &Call,
     plan: Box<Resolved<O::Work>>,
     wanted: Wanted,
-    began: Instant,
 ) -> Result<Answered, Problem> {
-    let mut report = AnswerHeaders::parsed_in(began.elapsed(), plan.main.stored.id);
-
+    let (app, admission) = (&call.app, &call.admission);
+    let mut report = AnswerHeaders::parsed_in(call.began.elapsed(), plan.main.stored.id);
     let fitting = Fitting { app, admission, has_surface: O::HAS_SURFACE };
     let outlook = fitting.outlook(&plan.main, plan.surface.as_ref(), plan.cost);
     within_deadline(app, admission, admission.set_work(outlook.as_work(O::NAME)))?;
@@ -180,8 +177,9 @@ pub async fn estimate<O: Operation>(
         let (named, memory) = intake.parse::<WithOperation<O>>(app, observer)?;
         Ok((named.request, memory))
     };
-    let Prepared::Ready(plan) = prepare::<O>(app, admission, intake, parsed, None, Instant::now()).await?
-    else {
+    let began = Instant::now();
+    let call = Call { app: app.clone(), admission: admission.clone(), wanted: None, began };
+    let Prepared::Ready(plan) = prepare::<O>(&call, intake, parsed).await? else {
         return Err(Problem::internal());
     };
     keep_all(app, admission.owner, &plan.fresh).await;
@@ -230,6 +228,16 @@ fn answer<O: Operation>(
     Ok(Answered { encoded, memory, report })
 }
 
+/// A call of an operation: who makes it, the format of its answer, and the time at which parsing began.
+#[derive(Clone)]
+struct Call {
+    app: Arc<App>,
+    admission: Arc<Admission>,
+    /// `None` for estimates, which are not answered by the operation.
+    wanted: Option<Wanted>,
+    began: Instant,
+}
+
 enum Prepared<W> {
     Ready(Box<Resolved<W>>),
     Answered(Box<Answered>, Vec<Arc<RegisteredCloud>>),
@@ -240,35 +248,30 @@ enum Prepared<W> {
 /// Small requests whose models are ready are answered in the same job, because each further job waits for a
 /// thread.
 async fn prepare<O: Operation>(
-    app: &Arc<App>,
-    admission: &Arc<Admission>,
+    call: &Call,
     intake: ReceivedBody,
     parsed: impl FnOnce(ReceivedBody, &App, &JobObserver) -> Result<(O, Reservation), Problem> + Send + 'static,
-    wanted: Option<Wanted>,
-    began: Instant,
 ) -> Result<Prepared<O::Work>, Problem> {
-    let (shared, admitted) = (app.clone(), admission.clone());
+    let (app, admission) = (&call.app, &call.admission);
     let flops = intake.body.flops_to_parse();
+    let shared = call.clone();
     let parse = move |observer: &JobObserver| {
-        let (request, memory) = parsed(intake, &shared, observer)?;
-        let absent = ids_not_in_memory(&shared, admitted.owner, &request);
+        let (request, memory) = parsed(intake, &shared.app, observer)?;
+        let received = Received { request, memory, clouds: Vec::new() };
+        let absent = ids_not_in_memory(&shared.app, shared.admission.owner, &received.request);
         if !absent.is_empty() {
-            return Ok(Parsed::NotInMemory(Box::new(request), memory, absent));
+            return Ok(Parsed::NotInMemory(Box::new(received), absent));
         }
-        planned::<O>((&shared, &admitted), (request, memory), Vec::new(), wanted, began, observer)
-            .map(Parsed::Planned)
+        planned(&shared, received, observer).map(Parsed::Planned)
     };
     let planned = match app.compute.run(admission, flops, parse).await?.0? {
         Parsed::Planned(planned) => planned,
-        Parsed::NotInMemory(request, memory, ids) => {
-            let mut found = Vec::new();
+        Parsed::NotInMemory(mut received, ids) => {
             for id in ids {
-                found.extend(find_cloud(app, admission, id).await?);
+                received.clouds.extend(find_cloud(app, admission, id).await?);
             }
-            let (shared, admitted) = (app.clone(), admission.clone());
-            let plan = move |observer: &JobObserver| {
-                planned::<O>((&shared, &admitted), (*request, memory), found, wanted, began, observer)
-            };
+            let shared = call.clone();
+            let plan = move |observer: &JobObserver| planned(&shared, *received, observer);
             app.compute.run(admission, 0.0, plan).await?.0?
         }
     };
@@ -279,23 +282,19 @@ async fn prepare<O: Operation>(
     while let Some(fit) = lacking_mut(&mut plan) {
         find_lacking(app, admission, fit).await?;
     }
-    app.compute
-        .run(admission, 0.0, move |_| resolve(*plan, memory, fresh))
-        .await?
-        .0
-        .map(|plan| Prepared::Ready(Box::new(plan)))
+    let job = move |_: &JobObserver| resolve(*plan, memory, fresh);
+    app.compute.run(admission, 0.0, job).await?.0.map(|plan| Prepared::Ready(Box::new(plan)))
 }
 
-/// Plans a parsed request, with clouds that were read from the store.
+/// Plans a parsed request.
 fn planned<O: Operation>(
-    (app, admission): (&Arc<App>, &Arc<Admission>),
-    (request, mut memory): (O, Reservation),
-    found: Vec<Arc<RegisteredCloud>>,
-    wanted: Option<Wanted>,
-    began: Instant,
+    call: &Call,
+    received: Received<O>,
     observer: &JobObserver,
 ) -> Result<Planned<O::Work>, Problem> {
-    let planner = Planner::with_clouds(app, admission.owner, found);
+    let Call { app, admission, wanted, began } = call;
+    let Received { request, mut memory, clouds } = received;
+    let planner = Planner::with_clouds(app, admission.owner, clouds);
     let mut plan = request.plan(&planner)?;
     let fresh = planner.into_fresh();
     memory.shrink_to(n_bytes_held(&plan));
@@ -334,11 +333,18 @@ fn ids_not_in_memory<O: Operation>(app: &App, owner: Owner, request: &O) -> Vec<
     ids.filter(|&id| !is_at_hand(id)).collect()
 }
 
+/// A parsed request with its memory, and the clouds that were read from the store for it.
+struct Received<O> {
+    request: O,
+    memory: Reservation,
+    clouds: Vec<Arc<RegisteredCloud>>,
+}
+
 /// A request whose body was parsed.
 enum Parsed<O: Operation> {
     Planned(Planned<O::Work>),
     /// Some clouds of the request have to be read from the store before it can be planned.
-    NotInMemory(Box<O>, Reservation, Vec<CloudId>),
+    NotInMemory(Box<Received<O>>, Vec<CloudId>),
 }
 
 /// A request that was checked.

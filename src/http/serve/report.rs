@@ -51,12 +51,15 @@ impl AnswerHeaders {
 
     /// Adds the headers to a response.
     pub fn head(&self, mut response: Response) -> Response {
+        let outcome = self.cache.unwrap_or(CacheOutcome::Hit);
+        // For the metrics.
+        response.extensions_mut().insert(outcome);
         let headers = response.headers_mut();
-        let cache = match self.cache {
-            None | Some(CacheOutcome::Hit) => "gramian; hit",
-            Some(CacheOutcome::Collapsed) => "gramian; fwd=miss; collapsed",
-            Some(CacheOutcome::Stored) => "gramian; fwd=miss; stored",
-            Some(CacheOutcome::NotStored) => "gramian; fwd=miss",
+        let cache = match outcome {
+            CacheOutcome::Hit => "gramian; hit",
+            CacheOutcome::Collapsed => "gramian; fwd=miss; collapsed",
+            CacheOutcome::Stored => "gramian; fwd=miss; stored",
+            CacheOutcome::NotStored => "gramian; fwd=miss",
         };
         headers.insert("cache-status", HeaderValue::from_static(cache));
         if let Some(cloud) = self.cloud

@@ -105,14 +105,14 @@ impl SurfaceGeometry {
     /// Array of deviations per query. Null where there is no answer, or where those of the surface are
     /// unknown.
     pub fn known_per_query(&self, data: Vec<f64>, shape: &[usize]) -> Array {
-        let is_null: Vec<bool> = match self.geometry.deviations() {
-            None => self.geometry.is_null().to_vec(),
-            Some(known) => {
-                let both = known.is_known.iter().zip(self.geometry.is_null());
-                both.map(|(is_known, is_null)| !is_known || *is_null).collect()
-            }
-        };
-        Array::new(data, shape).with_nulls(0, &is_null)
+        Array::new(data, shape).with_nulls(0, &self.lacks_deviations())
+    }
+
+    /// Returns for each query whether it has no answer, or the surface no deviation there.
+    fn lacks_deviations(&self) -> Vec<bool> {
+        let is_null = self.geometry.is_null();
+        let Some(known) = self.geometry.deviations() else { return is_null.to_vec() };
+        known.is_known.iter().zip(is_null).map(|(is_known, is_null)| !is_known || *is_null).collect()
     }
 
     /// Array of numbers per query, null where there is no answer.
@@ -143,12 +143,7 @@ impl SurfaceGeometry {
     pub fn deviations(&self) -> Option<DeviationArrays> {
         let deviations = self.geometry.deviations()?;
         let (m, k) = (self.geometry.n_queries(), self.geometry.dimension() - 1);
-        let is_null: Vec<bool> = deviations
-            .is_known
-            .iter()
-            .zip(self.geometry.is_null())
-            .map(|(is_known, is_null)| !is_known || *is_null)
-            .collect();
+        let is_null = self.lacks_deviations();
         let array = |data: &[f64], shape: &[usize]| Array::new(data.to_vec(), shape).with_nulls(0, &is_null);
         Some(DeviationArrays {
             normal: array(&deviations.normal, &[m]),

@@ -69,9 +69,12 @@ async fn who_does_not_want_them_any_more_gives_up_the_turn() {
     let budget = Budget::new(1 << 20, 1);
     let most = budget.try_reserve(A, 700 << 10).unwrap();
     let is_wanted = std::sync::atomic::AtomicBool::new(true);
-    let look = |_: Option<Shortage>| match is_wanted.load(std::sync::atomic::Ordering::Relaxed) {
-        true => ControlFlow::Continue(()),
-        false => ControlFlow::Break(()),
+    let look = |_: Option<Shortage>| {
+        if is_wanted.load(std::sync::atomic::Ordering::Relaxed) {
+            ControlFlow::Continue(())
+        } else {
+            ControlFlow::Break(())
+        }
     };
     let mut first = Box::pin(budget.reserve(A, 800 << 10, look));
     let mut second = Box::pin(budget.reserve(A, 100 << 10, keep_everything));

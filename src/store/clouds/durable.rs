@@ -90,10 +90,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
             Err(reason) => {
                 // The mark comes before the check, because memory never evicts a pending cloud.
                 cloud.set_pending();
-                match self.has(holder.owner, cloud) {
-                    true => Kept::Pending(reason),
-                    false => Kept::Nowhere(reason),
-                }
+                if self.has(holder.owner, cloud) { Kept::Pending(reason) } else { Kept::Nowhere(reason) }
             }
         }
     }

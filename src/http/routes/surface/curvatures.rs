@@ -1,54 +1,39 @@
 //! `POST /v1/curvatures`: curvatures of the surface that a cloud samples.
 
-use std::sync::Arc;
-
-use axum::Extension;
-use axum::extract::{Request, State};
-use axum::response::Response;
-
 use super::common::{GeometryWork, geometry_request, plan_geometry};
 use crate::http::compute::JobObserver;
 use crate::http::fields::{
     Degenerate, Diagnostics, Fit, GeometryInclude, OrientationChoice, SurfaceChoice, SurfaceUsed, request,
 };
-use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
+use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
-use crate::http::serve::operation::{Operation, Plan, serve};
+use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::planner::Planner;
-use crate::http::state::app::App;
-use crate::http::wire::read::members::{present, present_unless_empty, present_word, present_words};
+use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
-use crate::store::Owner;
 use gramian_numerics::kernel::defaults::Purpose;
 
 request! {
     /// A cloud that samples a hypersurface, and queries at which to compute its curvatures.
     pub struct CurvaturesRequest {
         /// The points to compute at, one row of coordinates each. Default: the points of the cloud.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The function whose level set is the surface. Default: `auto`.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub surface: Option<SurfaceChoice>,
         /// The direction of normals, which determines the sign of curvatures. Default: `outward`.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub orientation: Option<OrientationChoice>,
         /// Optional parts of the answer. Default: none.
-        #[serde(default, deserialize_with = "present_words")]
-        #[schema(nullable = false)]
         pub include: Option<Vec<GeometryInclude>>,
         /// At most 192 points of the cloud, where `"solver": "local"` learns noise and shape of the surface.
         ///
         /// Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
         /// the same sites and the points around them.
         #[serde(default, deserialize_with = "present_unless_empty")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, max_items = 192)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, max_items = 192)]
         pub sites: Option<Points>,
     }
 }
@@ -57,30 +42,23 @@ answer! {
     /// Curvatures of the surface at the queries.
     pub struct CurvaturesResponse {
         /// The d − 1 principal curvatures at each query, ascending, 1/length. Null where there is none.
-        #[schema(value_type = Vec<Option<Vec<f64>>>)]
-        principal_curvatures: Array,
+        principal_curvatures: Array as Vec<Option<Vec<f64>>>,
         /// A unit direction for each principal curvature, its largest component positive.
         ///
         /// Where curvatures coincide, their directions are an arbitrary basis.
-        #[schema(value_type = Vec<Option<Vec<Vec<f64>>>>)]
-        principal_directions: Array,
+        principal_directions: Array as Vec<Option<Vec<Vec<f64>>>>,
         /// The average of the principal curvatures at each query, 1/length. Null where there are none.
-        #[schema(value_type = Vec<Option<f64>>)]
-        mean_curvatures: Array,
+        mean_curvatures: Array as Vec<Option<f64>>,
         /// The product of the principal curvatures at each query, 1/length to the d − 1. Null where there are
         /// none.
-        #[schema(value_type = Vec<Option<f64>>)]
-        gaussian_curvatures: Array,
+        gaussian_curvatures: Array as Vec<Option<f64>>,
         /// The normal at each query, of length 1. Null where there is none.
-        #[schema(value_type = Vec<Option<Vec<f64>>>)]
-        normals: Array,
+        normals: Array as Vec<Option<Vec<f64>>>,
         /// |∇u| at each query for the function in `surfaces`: unit 1/length for `signature`, about 1 for
         /// `offset`.
-        #[schema(value_type = Vec<f64>)]
-        gradient_norms: Array,
+        gradient_norms: Array as Vec<f64>,
         /// The signature function at each query: 1 on the surface, usually more inside a closed one.
-        #[schema(value_type = Vec<f64>)]
-        levels: Array,
+        levels: Array as Vec<f64>,
         /// The function whose level surface was used at each query. It is `signature` where there is no
         /// answer.
         surfaces: Vec<SurfaceUsed>,
@@ -88,17 +66,13 @@ answer! {
         ///
         /// 95 % of the angles lie within 1.96 standard deviations. Null where there is no answer or the
         /// deviation is not known.
-        #[schema(value_type = Option<Vec<Option<f64>>>, nullable = false)]
-        normal_deviations: Option<Array>,
+        normal_deviations: Option<Array> as Option<Vec<Option<f64>>>,
         /// Standard deviations of the principal curvatures at each query, in their order, 1/length.
-        #[schema(value_type = Option<Vec<Option<Vec<f64>>>>, nullable = false)]
-        principal_curvature_deviations: Option<Array>,
+        principal_curvature_deviations: Option<Array> as Option<Vec<Option<Vec<f64>>>>,
         /// Standard deviations of the mean curvatures, 1/length.
-        #[schema(value_type = Option<Vec<Option<f64>>>, nullable = false)]
-        mean_curvature_deviations: Option<Array>,
+        mean_curvature_deviations: Option<Array> as Option<Vec<Option<f64>>>,
         /// Standard deviations of the Gaussian curvatures, 1/length to the d − 1.
-        #[schema(value_type = Option<Vec<Option<f64>>>, nullable = false)]
-        gaussian_curvature_deviations: Option<Array>,
+        gaussian_curvature_deviations: Option<Array> as Option<Vec<Option<f64>>>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,
         /// The numbers used, the method, its accuracy, and warnings.
@@ -106,6 +80,7 @@ answer! {
     }
 }
 
+operation! {
 /// Compute curvatures
 ///
 /// Returns principal curvatures with their directions, mean curvatures and Gaussian curvatures. Principal
@@ -113,25 +88,11 @@ answer! {
 /// function u. Where the gradient of u vanishes or is weak, an offset model of the nearest points takes the
 /// place of u. A sphere of radius r has curvatures +1/r with outward normals. Entries that the points around
 /// a query do not confirm are flagged.
-#[utoipa::path(
-    post,
-    path = "/v1/curvatures",
-    operation_id = "compute_curvatures",
-    tag = "geometry",
-    request_body = CurvaturesRequest,
-    responses((status = 200, description = "Curvatures at the queries", body = CurvaturesResponse), ComputeProblems),
-    security((), ("bearer" = []))
-)]
-pub async fn compute_curvatures(
-    State(app): State<Arc<App>>,
-    Extension(owner): Extension<Owner>,
-    request: Request,
-) -> Result<Response, Problem> {
-    serve::<CurvaturesRequest>(app, owner, request).await
+pub async fn compute_curvatures(CurvaturesRequest) -> CurvaturesResponse;
+path: "/v1/curvatures", tag: "geometry", answer: "Curvatures at the queries"
 }
 
 impl Operation for CurvaturesRequest {
-    const NAME: &'static str = "compute_curvatures";
     type Work = GeometryWork;
     type Answer = CurvaturesResponse;
     const HAS_SURFACE: bool = true;

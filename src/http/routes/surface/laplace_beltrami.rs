@@ -1,59 +1,43 @@
 //! `POST /v1/laplace-beltrami`: the operator on values, as a dense matrix (`/matrix`) and as a sparse one
 //! (`/sparse-matrix`).
 
-use std::sync::Arc;
-
-use axum::Extension;
-use axum::extract::{Request, State};
-use axum::response::Response;
 use serde::Deserialize;
 use utoipa::ToSchema;
 
-use super::operator::{Applied, AppliedWork, MatrixWork, StencilWork};
+use super::operator::{
+    Applied, AppliedAnswer, AppliedWork, MatrixAnswer, MatrixWork, SparseAnswer, StencilWork,
+};
 use crate::http::compute::JobObserver;
-use crate::http::fields::{
-    CloudRef, Degenerate, Diagnostics, Fit, Geometry, MeanChoice, ValuesInclude, request,
-};
-use crate::http::openapi::responses::ComputeProblems;
+use crate::http::fields::{Degenerate, Diagnostics, Fit, Geometry, MeanChoice, ValuesInclude, request};
 use crate::http::problem::Problem;
+use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
-use crate::http::serve::operation::{Operation, Plan, serve};
+use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::planner::Planner;
-use crate::http::state::app::App;
 use crate::http::wire::negotiation::Format;
-use crate::http::wire::read::members::{
-    present, present_object, present_unless_empty, present_word, present_words,
-};
+use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
 use crate::http::wire::write::integers::Integers;
-use crate::store::Owner;
 use gramian_numerics::surface::operators::Operator;
 
 const OPERATOR: Operator = Operator::LaplaceBeltrami;
 
 request! {
     /// Values on a surface, and queries at which to compute their Laplace–Beltrami operator.
-    pub struct LaplaceBeltramiRequest {
+    pub struct LaplaceBeltramiRequest with geometry {
         /// The values at the points of `cloud`, in their order.
         #[schema(min_items = 1)]
         pub values: Vec<f64>,
         /// The mean of the function. Default: a constant if `kernel` is absent too, else 0.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
         /// The points to compute at, one row of coordinates each. Default: the points of the surface's cloud.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The surface, if its fit differs from that of the values.
-        #[serde(default, deserialize_with = "present_object")]
-        #[schema(nullable = false)]
         pub geometry: Option<Geometry>,
         /// Optional parts of the answer. Default: none.
-        #[serde(default, deserialize_with = "present_words")]
-        #[schema(nullable = false)]
         pub include: Option<Vec<ValuesInclude>>,
     }
 }
@@ -69,26 +53,20 @@ pub enum MatrixFormat {
 
 request! {
     /// A cloud of nodes on a surface, and queries for the rows of its Laplace–Beltrami matrix.
-    pub struct LaplaceBeltramiMatrixRequest {
+    pub struct LaplaceBeltramiMatrixRequest with geometry {
         /// The points to compute rows for, one row of the matrix each. Default: the points of the surface's
         /// cloud.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The surface, if its fit differs from that of the values.
-        #[serde(default, deserialize_with = "present_object")]
-        #[schema(nullable = false)]
         pub geometry: Option<Geometry>,
         /// The mean of the functions through the values. Default: 0.
         ///
         /// With a constant mean, the matrix maps constants to exactly 0.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
         /// Deprecated: matrices of this path are dense. For sparse ones, use
         /// `/v1/laplace-beltrami/sparse-matrix`.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false, deprecated)]
+        #[schema(deprecated)]
         pub format: Option<MatrixFormat>,
     }
 }
@@ -97,14 +75,12 @@ answer! {
     /// The Laplace–Beltrami operator of the values at the queries.
     pub struct LaplaceBeltramiResponse {
         /// Δu at each query, unit of the values per length squared. Null where there is no normal.
-        #[schema(value_type = Vec<Option<f64>>)]
-        values: Array,
+        values: Array as Vec<Option<f64>>,
         /// Standard deviation of Δu at each query. Present if `include` has `deviations`.
         ///
         /// It comes from noise and gaps of the values and, as far as the surface has deviations, also from
         /// the surface. Null where there is no answer or no deviation.
-        #[schema(nullable = false, value_type = Option<Vec<Option<f64>>>)]
-        value_deviations: Option<Array>,
+        value_deviations: Option<Array> as Option<Vec<Option<f64>>>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,
         /// The numbers used, the method, its accuracy, and warnings.
@@ -118,8 +94,7 @@ answer! {
         /// The matrix, unit 1/length². Rows are queries, and columns are the points of `cloud`.
         ///
         /// A row is null where there is no normal. The matrix is not symmetric in general.
-        #[schema(value_type = Vec<Option<Vec<f64>>>)]
-        matrix: Array,
+        matrix: Array as Vec<Option<Vec<f64>>>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,
         /// The numbers used, the method, its accuracy, and warnings.
@@ -127,57 +102,28 @@ answer! {
     }
 }
 
+operation! {
 /// Compute the Laplace–Beltrami operator
 ///
 /// Returns Δu = tr D²u − νᵀD²uν − tr(Dν) ∂_νu of the function u through the values, on the level surface of
 /// the signature function. On the unit circle Δ cos θ = −cos θ.
-#[utoipa::path(
-    post,
-    path = "/v1/laplace-beltrami",
-    operation_id = "compute_laplace_beltrami",
-    tag = "operators",
-    request_body = LaplaceBeltramiRequest,
-    responses((status = 200, description = "Δu at the queries", body = LaplaceBeltramiResponse), ComputeProblems),
-    security((), ("bearer" = []))
-)]
-pub async fn compute_laplace_beltrami(
-    State(app): State<Arc<App>>,
-    Extension(owner): Extension<Owner>,
-    request: Request,
-) -> Result<Response, Problem> {
-    serve::<LaplaceBeltramiRequest>(app, owner, request).await
+pub async fn compute_laplace_beltrami(LaplaceBeltramiRequest) -> LaplaceBeltramiResponse;
+path: "/v1/laplace-beltrami", tag: "operators", answer: "Δu at the queries"
 }
 
+operation! {
 /// Assemble the Laplace–Beltrami matrix
 ///
 /// Returns the matrix that maps values at the nodes to the Laplace–Beltrami operator at the queries. The
 /// matrix need not be square.
-#[utoipa::path(
-    post,
-    path = "/v1/laplace-beltrami/matrix",
-    operation_id = "assemble_laplace_beltrami_matrix",
-    tag = "operators",
-    request_body = LaplaceBeltramiMatrixRequest,
-    responses((status = 200, description = "The matrix", body = LaplaceBeltramiMatrixResponse), ComputeProblems),
-    security((), ("bearer" = []))
-)]
-pub async fn assemble_laplace_beltrami_matrix(
-    State(app): State<Arc<App>>,
-    Extension(owner): Extension<Owner>,
-    request: Request,
-) -> Result<Response, Problem> {
-    serve::<LaplaceBeltramiMatrixRequest>(app, owner, request).await
+pub async fn assemble_laplace_beltrami_matrix(LaplaceBeltramiMatrixRequest) -> LaplaceBeltramiMatrixResponse;
+path: "/v1/laplace-beltrami/matrix", tag: "operators", answer: "The matrix"
 }
 
 impl Operation for LaplaceBeltramiRequest {
-    const NAME: &'static str = "compute_laplace_beltrami";
     type Work = AppliedWork;
     type Answer = LaplaceBeltramiResponse;
     const HAS_SURFACE: bool = true;
-
-    fn surface_cloud(&self) -> Option<&CloudRef> {
-        self.geometry.as_ref()?.cloud.as_ref()
-    }
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<AppliedWork>, Problem> {
         let values = std::mem::take(&mut self.values);
@@ -192,25 +138,16 @@ impl Operation for LaplaceBeltramiRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<LaplaceBeltramiResponse, Problem> {
-        let found = work.apply(OPERATOR, fits, observer)?;
-        Ok(LaplaceBeltramiResponse {
-            values: found.values,
-            value_deviations: found.deviations,
-            degenerate: found.degenerate,
-            diagnostics: found.diagnostics,
-        })
+        let AppliedAnswer { values, deviations, degenerate, diagnostics } =
+            work.apply(OPERATOR, fits, observer)?;
+        Ok(LaplaceBeltramiResponse { values, value_deviations: deviations, degenerate, diagnostics })
     }
 }
 
 impl Operation for LaplaceBeltramiMatrixRequest {
-    const NAME: &'static str = "assemble_laplace_beltrami_matrix";
     type Work = MatrixWork;
     type Answer = LaplaceBeltramiMatrixResponse;
     const HAS_SURFACE: bool = true;
-
-    fn surface_cloud(&self) -> Option<&CloudRef> {
-        self.geometry.as_ref()?.cloud.as_ref()
-    }
     const FORMATS: &[Format] = &[Format::Json, Format::Safetensors, Format::Npy];
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<MatrixWork>, Problem> {
@@ -224,32 +161,25 @@ impl Operation for LaplaceBeltramiMatrixRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<LaplaceBeltramiMatrixResponse, Problem> {
-        let found = work.matrix(OPERATOR, fits, observer)?;
-        Ok(LaplaceBeltramiMatrixResponse {
-            matrix: found.matrix,
-            degenerate: found.degenerate,
-            diagnostics: found.diagnostics,
-        })
+        let MatrixAnswer { matrix, degenerate, diagnostics } = work.matrix(OPERATOR, fits, observer)?;
+        Ok(LaplaceBeltramiMatrixResponse { matrix, degenerate, diagnostics })
     }
 }
 
 request! {
     /// A cloud of nodes on a surface, and queries for the rows of its sparse Laplace–Beltrami matrix.
-    pub struct LaplaceBeltramiSparseMatrixRequest {
+    pub struct LaplaceBeltramiSparseMatrixRequest with geometry {
         /// The points to compute rows for, one row of the matrix each. Default: the points of the surface.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The surface, if it differs from that of the request.
-        #[serde(default, deserialize_with = "present_object")]
-        #[schema(nullable = false)]
         pub geometry: Option<Geometry>,
         /// At most 192 points of the cloud, where `"solver": "local"` learns noise and shape of the surface.
         ///
         /// Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
         /// the same sites and the points around them.
         #[serde(default, deserialize_with = "present_unless_empty")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, max_items = 192)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, max_items = 192)]
         pub sites: Option<Points>,
     }
 }
@@ -258,19 +188,15 @@ answer! {
     /// The Laplace–Beltrami operator as a sparse matrix with rows for the queries and columns for the nodes.
     pub struct LaplaceBeltramiSparseMatrixResponse {
         /// The number of queries and the number of nodes.
-        #[schema(value_type = Vec<i64>)]
-        shape: Integers,
+        shape: Integers as Vec<i64>,
         /// The position of the first entry of each row, from 0, and the number of all entries at the end.
-        #[schema(value_type = Vec<i64>)]
-        indptr: Integers,
+        indptr: Integers as Vec<i64>,
         /// The column of each entry, from 0, ascending within a row.
-        #[schema(value_type = Vec<i64>)]
-        indices: Integers,
+        indices: Integers as Vec<i64>,
         /// The entries row by row, 1/length².
         ///
         /// In Python: `scipy.sparse.csr_matrix((data, indices, indptr), shape)`.
-        #[schema(value_type = Vec<f64>)]
-        data: Array,
+        data: Array as Vec<f64>,
         /// The queries where geometry has no meaning (an empty row), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,
         /// The numbers used for the surface, the method, its accuracy, and warnings.
@@ -278,6 +204,7 @@ answer! {
     }
 }
 
+operation! {
 /// Assemble the sparse matrix of the Laplace–Beltrami operator
 ///
 /// Returns a matrix whose rows weight the nodes near each query. Weights come from smoothed polyharmonic
@@ -287,32 +214,14 @@ answer! {
 /// If the queries are the nodes, no eigenvalue has a positive real part, so the matrix can be used for time
 /// steps. To achieve this, rows at a rim are those of a boundary that nothing flows through, and are flagged.
 /// `diagnostics.stencils` counts rows of each kind.
-#[utoipa::path(
-    post,
-    path = "/v1/laplace-beltrami/sparse-matrix",
-    operation_id = "assemble_laplace_beltrami_sparse_matrix",
-    tag = "operators",
-    request_body = LaplaceBeltramiSparseMatrixRequest,
-    responses((status = 200, description = "The matrix", body = LaplaceBeltramiSparseMatrixResponse), ComputeProblems),
-    security((), ("bearer" = []))
-)]
-pub async fn assemble_laplace_beltrami_sparse_matrix(
-    State(app): State<Arc<App>>,
-    Extension(owner): Extension<Owner>,
-    request: Request,
-) -> Result<Response, Problem> {
-    serve::<LaplaceBeltramiSparseMatrixRequest>(app, owner, request).await
+pub async fn assemble_laplace_beltrami_sparse_matrix(LaplaceBeltramiSparseMatrixRequest) -> LaplaceBeltramiSparseMatrixResponse;
+path: "/v1/laplace-beltrami/sparse-matrix", tag: "operators", answer: "The matrix"
 }
 
 impl Operation for LaplaceBeltramiSparseMatrixRequest {
-    const NAME: &'static str = "assemble_laplace_beltrami_sparse_matrix";
     type Work = StencilWork;
     type Answer = LaplaceBeltramiSparseMatrixResponse;
     const HAS_SURFACE: bool = true;
-
-    fn surface_cloud(&self) -> Option<&CloudRef> {
-        self.geometry.as_ref()?.cloud.as_ref()
-    }
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<StencilWork>, Problem> {
         let fit = Fit { sites: self.sites.take(), ..self.take_fit() };
@@ -324,14 +233,8 @@ impl Operation for LaplaceBeltramiSparseMatrixRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<LaplaceBeltramiSparseMatrixResponse, Problem> {
-        let found = work.matrix(OPERATOR, fits, observer)?;
-        Ok(LaplaceBeltramiSparseMatrixResponse {
-            shape: found.shape,
-            indptr: found.indptr,
-            indices: found.indices,
-            data: found.data,
-            degenerate: found.degenerate,
-            diagnostics: found.diagnostics,
-        })
+        let SparseAnswer { shape, indptr, indices, data, degenerate, diagnostics } =
+            work.matrix(OPERATOR, fits, observer)?;
+        Ok(LaplaceBeltramiSparseMatrixResponse { shape, indptr, indices, data, degenerate, diagnostics })
     }
 }

@@ -1,54 +1,39 @@
 //! `POST /v1/normals`: unit normals of the surface that a cloud samples.
 
-use std::sync::Arc;
-
-use axum::Extension;
-use axum::extract::{Request, State};
-use axum::response::Response;
-
 use super::common::{GeometryWork, geometry_request, plan_geometry};
 use crate::http::compute::JobObserver;
 use crate::http::fields::{
     Degenerate, Diagnostics, Fit, GeometryInclude, OrientationChoice, SurfaceChoice, SurfaceUsed, request,
 };
-use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
+use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
-use crate::http::serve::operation::{Operation, Plan, serve};
+use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::planner::Planner;
-use crate::http::state::app::App;
-use crate::http::wire::read::members::{present, present_unless_empty, present_word, present_words};
+use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
-use crate::store::Owner;
 use gramian_numerics::kernel::defaults::Purpose;
 
 request! {
     /// A cloud that samples a hypersurface, and queries at which to compute its normals.
     pub struct NormalsRequest {
         /// The points to compute at, one row of coordinates each. Default: the points of the cloud.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The function whose level set is the surface. Default: `auto`.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub surface: Option<SurfaceChoice>,
         /// The direction of normals. Default: `outward`.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub orientation: Option<OrientationChoice>,
         /// Optional parts of the answer. Default: none.
-        #[serde(default, deserialize_with = "present_words")]
-        #[schema(nullable = false)]
         pub include: Option<Vec<GeometryInclude>>,
         /// At most 192 points of the cloud, where `"solver": "local"` learns noise and shape of the surface.
         ///
         /// Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
         /// the same sites and the points around them.
         #[serde(default, deserialize_with = "present_unless_empty")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, max_items = 192)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, max_items = 192)]
         pub sites: Option<Points>,
     }
 }
@@ -57,15 +42,12 @@ answer! {
     /// Unit normals of the surface at the queries.
     pub struct NormalsResponse {
         /// The normal at each query, of length 1. Null where there is none.
-        #[schema(value_type = Vec<Option<Vec<f64>>>)]
-        normals: Array,
+        normals: Array as Vec<Option<Vec<f64>>>,
         /// |∇u| at each query for the function in `surfaces`: unit 1/length for `signature`, about 1 for
         /// `offset`.
-        #[schema(value_type = Vec<f64>)]
-        gradient_norms: Array,
+        gradient_norms: Array as Vec<f64>,
         /// The signature function at each query: 1 on the surface, usually more inside a closed one.
-        #[schema(value_type = Vec<f64>)]
-        levels: Array,
+        levels: Array as Vec<f64>,
         /// The function whose level surface was used at each query. It is `signature` where there is no
         /// answer.
         surfaces: Vec<SurfaceUsed>,
@@ -73,8 +55,7 @@ answer! {
         ///
         /// 95 % of the angles lie within 1.96 standard deviations. Null where there is no answer or the
         /// deviation is not known.
-        #[schema(value_type = Option<Vec<Option<f64>>>, nullable = false)]
-        normal_deviations: Option<Array>,
+        normal_deviations: Option<Array> as Option<Vec<Option<f64>>>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,
         /// The numbers used, the method, its accuracy, and warnings.
@@ -82,31 +63,18 @@ answer! {
     }
 }
 
+operation! {
 /// Compute normals
 ///
 /// Returns the unit normals ν = −∇u/|∇u| (outward) of the level surface of the signature function u, the
 /// interpolant of the constant 1. The cloud needs no mesh and no neighbourhoods. Signs are checked against
 /// the neighbours and repaired. Where the gradient of u vanishes, an offset model of the nearest points takes
 /// the place of u.
-#[utoipa::path(
-    post,
-    path = "/v1/normals",
-    operation_id = "compute_normals",
-    tag = "geometry",
-    request_body = NormalsRequest,
-    responses((status = 200, description = "Normals at the queries", body = NormalsResponse), ComputeProblems),
-    security((), ("bearer" = []))
-)]
-pub async fn compute_normals(
-    State(app): State<Arc<App>>,
-    Extension(owner): Extension<Owner>,
-    request: Request,
-) -> Result<Response, Problem> {
-    serve::<NormalsRequest>(app, owner, request).await
+pub async fn compute_normals(NormalsRequest) -> NormalsResponse;
+path: "/v1/normals", tag: "geometry", answer: "Normals at the queries"
 }
 
 impl Operation for NormalsRequest {
-    const NAME: &'static str = "compute_normals";
     type Work = GeometryWork;
     type Answer = NormalsResponse;
     const HAS_SURFACE: bool = true;

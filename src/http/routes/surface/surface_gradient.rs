@@ -1,78 +1,56 @@
 //! `POST /v1/surface-gradient`: the operator on values, as dense matrices (`/matrix`) and as sparse ones
 //! (`/sparse-matrix`).
 
-use std::sync::Arc;
-
-use axum::Extension;
-use axum::extract::{Request, State};
-use axum::response::Response;
-
-use super::operator::{Applied, AppliedWork, MatrixWork, StencilWork};
+use super::operator::{
+    Applied, AppliedAnswer, AppliedWork, MatrixAnswer, MatrixWork, SparseAnswer, StencilWork,
+};
 use crate::http::compute::JobObserver;
-use crate::http::fields::{
-    CloudRef, Degenerate, Diagnostics, Fit, Geometry, MeanChoice, ValuesInclude, request,
-};
-use crate::http::openapi::responses::ComputeProblems;
+use crate::http::fields::{Degenerate, Diagnostics, Fit, Geometry, MeanChoice, ValuesInclude, request};
 use crate::http::problem::Problem;
+use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
-use crate::http::serve::operation::{Operation, Plan, serve};
+use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::planner::Planner;
-use crate::http::state::app::App;
 use crate::http::wire::negotiation::Format;
-use crate::http::wire::read::members::{
-    present, present_object, present_unless_empty, present_word, present_words,
-};
+use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
 use crate::http::wire::write::integers::Integers;
-use crate::store::Owner;
 use gramian_numerics::surface::operators::Operator;
 
 const OPERATOR: Operator = Operator::SurfaceGradient;
 
 request! {
     /// Values on a surface, and queries at which to compute their surface gradient.
-    pub struct SurfaceGradientRequest {
+    pub struct SurfaceGradientRequest with geometry {
         /// The values at the points of `cloud`, in their order.
         #[schema(min_items = 1)]
         pub values: Vec<f64>,
         /// The mean of the function. Default: a constant if `kernel` is absent too, else 0.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
         /// The points to compute at, one row of coordinates each. Default: the points of the surface's cloud.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The surface, if its fit differs from that of the values.
-        #[serde(default, deserialize_with = "present_object")]
-        #[schema(nullable = false)]
         pub geometry: Option<Geometry>,
         /// Optional parts of the answer. Default: none.
-        #[serde(default, deserialize_with = "present_words")]
-        #[schema(nullable = false)]
         pub include: Option<Vec<ValuesInclude>>,
     }
 }
 
 request! {
     /// A cloud of nodes on a surface, and queries for the rows of its surface gradient matrices.
-    pub struct SurfaceGradientMatrixRequest {
+    pub struct SurfaceGradientMatrixRequest with geometry {
         /// The points to compute rows for, one row of each matrix. Default: the points of the surface's
         /// cloud.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The surface, if its fit differs from that of the values.
-        #[serde(default, deserialize_with = "present_object")]
-        #[schema(nullable = false)]
         pub geometry: Option<Geometry>,
         /// The mean of the functions through the values. Default: 0.
         ///
         /// With a constant mean, the matrix maps constants to exactly 0.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
     }
 }
@@ -81,14 +59,12 @@ answer! {
     /// Surface gradients at the queries.
     pub struct SurfaceGradientResponse {
         /// ∇u − (∇u·ν)ν at each query, unit of the values per length. Null where there is no normal.
-        #[schema(value_type = Vec<Option<Vec<f64>>>)]
-        gradients: Array,
+        gradients: Array as Vec<Option<Vec<f64>>>,
         /// Standard deviation of each component at each query. Present if `include` has `deviations`.
         ///
         /// It comes from noise and gaps of the values and, as far as the surface has deviations, also from
         /// the surface. Null where there is no answer or no deviation.
-        #[schema(nullable = false, value_type = Option<Vec<Option<Vec<f64>>>>)]
-        gradient_deviations: Option<Array>,
+        gradient_deviations: Option<Array> as Option<Vec<Option<Vec<f64>>>>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,
         /// The numbers used, the method, its accuracy, and warnings.
@@ -102,8 +78,7 @@ answer! {
         /// A matrix per coordinate, unit 1/length. Rows are queries, and columns are the points of `cloud`.
         ///
         /// A row is null where there is no normal.
-        #[schema(value_type = Vec<Vec<Option<Vec<f64>>>>)]
-        matrices: Array,
+        matrices: Array as Vec<Vec<Option<Vec<f64>>>>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,
         /// The numbers used, the method, its accuracy, and warnings.
@@ -111,57 +86,28 @@ answer! {
     }
 }
 
+operation! {
 /// Compute surface gradients
 ///
 /// Returns the tangential part of the gradient of the function through the values, on the level surface of
 /// the signature function.
-#[utoipa::path(
-    post,
-    path = "/v1/surface-gradient",
-    operation_id = "compute_surface_gradient",
-    tag = "operators",
-    request_body = SurfaceGradientRequest,
-    responses((status = 200, description = "Surface gradients at the queries", body = SurfaceGradientResponse), ComputeProblems),
-    security((), ("bearer" = []))
-)]
-pub async fn compute_surface_gradient(
-    State(app): State<Arc<App>>,
-    Extension(owner): Extension<Owner>,
-    request: Request,
-) -> Result<Response, Problem> {
-    serve::<SurfaceGradientRequest>(app, owner, request).await
+pub async fn compute_surface_gradient(SurfaceGradientRequest) -> SurfaceGradientResponse;
+path: "/v1/surface-gradient", tag: "operators", answer: "Surface gradients at the queries"
 }
 
+operation! {
 /// Assemble surface gradient matrices
 ///
 /// Returns a matrix per coordinate. It maps values at the nodes to that component of the surface gradient at
 /// the queries.
-#[utoipa::path(
-    post,
-    path = "/v1/surface-gradient/matrix",
-    operation_id = "assemble_surface_gradient_matrix",
-    tag = "operators",
-    request_body = SurfaceGradientMatrixRequest,
-    responses((status = 200, description = "The matrices", body = SurfaceGradientMatrixResponse), ComputeProblems),
-    security((), ("bearer" = []))
-)]
-pub async fn assemble_surface_gradient_matrix(
-    State(app): State<Arc<App>>,
-    Extension(owner): Extension<Owner>,
-    request: Request,
-) -> Result<Response, Problem> {
-    serve::<SurfaceGradientMatrixRequest>(app, owner, request).await
+pub async fn assemble_surface_gradient_matrix(SurfaceGradientMatrixRequest) -> SurfaceGradientMatrixResponse;
+path: "/v1/surface-gradient/matrix", tag: "operators", answer: "The matrices"
 }
 
 impl Operation for SurfaceGradientRequest {
-    const NAME: &'static str = "compute_surface_gradient";
     type Work = AppliedWork;
     type Answer = SurfaceGradientResponse;
     const HAS_SURFACE: bool = true;
-
-    fn surface_cloud(&self) -> Option<&CloudRef> {
-        self.geometry.as_ref()?.cloud.as_ref()
-    }
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<AppliedWork>, Problem> {
         let values = std::mem::take(&mut self.values);
@@ -176,25 +122,21 @@ impl Operation for SurfaceGradientRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<SurfaceGradientResponse, Problem> {
-        let found = work.apply(OPERATOR, fits, observer)?;
+        let AppliedAnswer { values, deviations, degenerate, diagnostics } =
+            work.apply(OPERATOR, fits, observer)?;
         Ok(SurfaceGradientResponse {
-            gradients: found.values,
-            gradient_deviations: found.deviations,
-            degenerate: found.degenerate,
-            diagnostics: found.diagnostics,
+            gradients: values,
+            gradient_deviations: deviations,
+            degenerate,
+            diagnostics,
         })
     }
 }
 
 impl Operation for SurfaceGradientMatrixRequest {
-    const NAME: &'static str = "assemble_surface_gradient_matrix";
     type Work = MatrixWork;
     type Answer = SurfaceGradientMatrixResponse;
     const HAS_SURFACE: bool = true;
-
-    fn surface_cloud(&self) -> Option<&CloudRef> {
-        self.geometry.as_ref()?.cloud.as_ref()
-    }
     const FORMATS: &[Format] = &[Format::Json, Format::Safetensors, Format::Npy];
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<MatrixWork>, Problem> {
@@ -207,32 +149,25 @@ impl Operation for SurfaceGradientMatrixRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<SurfaceGradientMatrixResponse, Problem> {
-        let found = work.matrix(OPERATOR, fits, observer)?;
-        Ok(SurfaceGradientMatrixResponse {
-            matrices: found.matrix,
-            degenerate: found.degenerate,
-            diagnostics: found.diagnostics,
-        })
+        let MatrixAnswer { matrix, degenerate, diagnostics } = work.matrix(OPERATOR, fits, observer)?;
+        Ok(SurfaceGradientMatrixResponse { matrices: matrix, degenerate, diagnostics })
     }
 }
 
 request! {
     /// A cloud of nodes on a surface, and queries for the rows of its sparse surface gradient matrices.
-    pub struct SurfaceGradientSparseMatrixRequest {
+    pub struct SurfaceGradientSparseMatrixRequest with geometry {
         /// The points to compute rows for, one row of each matrix. Default: the points of the surface.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The surface, if it differs from that of the request.
-        #[serde(default, deserialize_with = "present_object")]
-        #[schema(nullable = false)]
         pub geometry: Option<Geometry>,
         /// At most 192 points of the cloud, where `"solver": "local"` learns noise and shape of the surface.
         ///
         /// Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
         /// the same sites and the points around them.
         #[serde(default, deserialize_with = "present_unless_empty")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, max_items = 192)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, max_items = 192)]
         pub sites: Option<Points>,
     }
 }
@@ -241,17 +176,13 @@ answer! {
     /// The components of the surface gradient as sparse matrices. Rows are queries, and columns are nodes.
     pub struct SurfaceGradientSparseMatrixResponse {
         /// The number of components, of queries and of nodes.
-        #[schema(value_type = Vec<i64>)]
-        shape: Integers,
+        shape: Integers as Vec<i64>,
         /// The position of the first entry of each row, from 0, and the number of all entries at the end.
-        #[schema(value_type = Vec<i64>)]
-        indptr: Integers,
+        indptr: Integers as Vec<i64>,
         /// The column of each entry, from 0, ascending within a row.
-        #[schema(value_type = Vec<i64>)]
-        indices: Integers,
+        indices: Integers as Vec<i64>,
         /// The entries row by row, 1/length, as a list per component.
-        #[schema(value_type = Vec<Vec<f64>>)]
-        data: Array,
+        data: Array as Vec<Vec<f64>>,
         /// The queries where geometry has no meaning (an empty row), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,
         /// The numbers used for the surface, the method, its accuracy, and warnings.
@@ -259,37 +190,20 @@ answer! {
     }
 }
 
+operation! {
 /// Assemble the sparse matrix of the surface gradient
 ///
 /// Returns matrices whose rows weight the nodes near each query. Weights come from polyharmonic splines with
 /// polynomials of degree 4 over the tangent plane. They are exact for these polynomials, and of third order
 /// for second derivatives. The matrices need no kernel for values and take any number of nodes.
-#[utoipa::path(
-    post,
-    path = "/v1/surface-gradient/sparse-matrix",
-    operation_id = "assemble_surface_gradient_sparse_matrix",
-    tag = "operators",
-    request_body = SurfaceGradientSparseMatrixRequest,
-    responses((status = 200, description = "The matrix", body = SurfaceGradientSparseMatrixResponse), ComputeProblems),
-    security((), ("bearer" = []))
-)]
-pub async fn assemble_surface_gradient_sparse_matrix(
-    State(app): State<Arc<App>>,
-    Extension(owner): Extension<Owner>,
-    request: Request,
-) -> Result<Response, Problem> {
-    serve::<SurfaceGradientSparseMatrixRequest>(app, owner, request).await
+pub async fn assemble_surface_gradient_sparse_matrix(SurfaceGradientSparseMatrixRequest) -> SurfaceGradientSparseMatrixResponse;
+path: "/v1/surface-gradient/sparse-matrix", tag: "operators", answer: "The matrix"
 }
 
 impl Operation for SurfaceGradientSparseMatrixRequest {
-    const NAME: &'static str = "assemble_surface_gradient_sparse_matrix";
     type Work = StencilWork;
     type Answer = SurfaceGradientSparseMatrixResponse;
     const HAS_SURFACE: bool = true;
-
-    fn surface_cloud(&self) -> Option<&CloudRef> {
-        self.geometry.as_ref()?.cloud.as_ref()
-    }
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<StencilWork>, Problem> {
         let fit = Fit { sites: self.sites.take(), ..self.take_fit() };
@@ -301,14 +215,8 @@ impl Operation for SurfaceGradientSparseMatrixRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<SurfaceGradientSparseMatrixResponse, Problem> {
-        let found = work.matrix(OPERATOR, fits, observer)?;
-        Ok(SurfaceGradientSparseMatrixResponse {
-            shape: found.shape,
-            indptr: found.indptr,
-            indices: found.indices,
-            data: found.data,
-            degenerate: found.degenerate,
-            diagnostics: found.diagnostics,
-        })
+        let SparseAnswer { shape, indptr, indices, data, degenerate, diagnostics } =
+            work.matrix(OPERATOR, fits, observer)?;
+        Ok(SurfaceGradientSparseMatrixResponse { shape, indptr, indices, data, degenerate, diagnostics })
     }
 }

@@ -2,29 +2,21 @@
 
 mod search;
 
-use std::sync::Arc;
-
-use axum::Extension;
-use axum::extract::{Request, State};
-use axum::response::Response;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::http::compute::JobObserver;
 use crate::http::fields::{Diagnostics, DuplicatePolicy, Fit, KernelFamily, KernelUsed, MeanChoice, request};
-use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
+use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
-use crate::http::serve::operation::{Operation, Plan, serve};
+use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::plan::Cost;
 use crate::http::serve::planner::{DenseOnly, GivenValues, Planner};
-use crate::http::state::app::App;
-use crate::http::wire::read::members::{present, present_word, present_words, word};
-use crate::http::wire::write::answer::{Member, Parts, answer};
+use crate::http::wire::write::answer::{answer, json_members};
 use crate::http::wire::write::array::Array;
 use crate::http::wire::write::json::Nullable;
-use crate::store::Owner;
 use search::{Search, Work};
 
 /// The score that a selection maximizes.
@@ -63,11 +55,9 @@ pub enum SelectionParameter {
 #[serde(deny_unknown_fields)]
 pub struct FreeParameter {
     /// The parameter.
-    #[serde(deserialize_with = "word")]
     pub parameter: SelectionParameter,
     /// The axis, from 0, for `length_scales` only. Default: every axis, each within these bounds.
-    #[serde(default, deserialize_with = "present")]
-    #[schema(nullable = false, minimum = 0)]
+    #[schema(minimum = 0)]
     pub axis: Option<usize>,
     /// The lower bound.
     #[schema(exclusive_minimum = 0.0)]
@@ -86,12 +76,8 @@ request! {
         #[schema(min_items = 1)]
         pub values: Vec<f64>,
         /// The mean of the function. Default: a constant if `kernel` is absent too, else 0.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
         /// The score to maximize. Default: the marginal likelihood.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub criterion: Option<SelectionCriterion>,
         /// The free parameters and their bounds, at most 64 entries. Default: length scale, variance, alpha.
         ///
@@ -100,22 +86,16 @@ request! {
         /// is given for each point. Its lower bound is a millionth of its start, or of a millionth of the
         /// variance if that is more. Its upper bound is a hundred times its start, or a hundred times the
         /// variance if that is more.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false)]
         pub vary: Option<Vec<FreeParameter>>,
         /// Kernel families to try. Default: that of the start, and `matern` if `nu` varies.
         ///
         /// A family takes the parameters of `kernel` if `kernel` is of that family.
-        #[serde(default, deserialize_with = "present_words")]
-        #[schema(nullable = false)]
         pub families: Option<Vec<KernelFamily>>,
         /// Number of further starts for each family, spread over the bounds. Default: 2.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, minimum = 0, maximum = 100)]
+        #[schema(minimum = 0, maximum = 100)]
         pub restarts: Option<u8>,
         /// The seed that determines the further starts. Default: 0.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, minimum = 0, maximum = 9007199254740991u64)]
+        #[schema(minimum = 0, maximum = 9007199254740991u64)]
         pub seed: Option<u64>,
     }
 }
@@ -144,11 +124,7 @@ pub struct LeftOut {
     pub log_predictive_densities: Vec<Nullable>,
 }
 
-impl Member for LeftOut {
-    fn add_to(self, name: &'static str, parts: &mut Parts) -> Result<(), Problem> {
-        parts.add_json(name, &self)
-    }
-}
+json_members!(LeftOut);
 
 /// The best score of a family.
 #[derive(Debug, Clone, Serialize, ToSchema)]
@@ -157,7 +133,6 @@ pub struct FamilyScore {
     pub family: KernelFamily,
     /// The smoothness ν of the Matérn family. Absent for other families.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub nu: Option<f64>,
     /// The best score of the family. Null if the matrix was not positive definite from any start.
     #[schema(value_type = Option<f64>, nullable = true)]
@@ -170,20 +145,17 @@ answer! {
         /// The selected kernel. Sent as `kernel` of a request, it is used as it is.
         kernel: KernelUsed,
         /// The selected variance of the noise. Absent with `noise_variances`.
-        #[schema(nullable = false)]
         alpha: Option<f64>,
         /// The mean of the function: the constant, then a slope per coordinate if it is linear. Absent if the
         /// mean is 0.
-        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
-        mean_coefficients: Option<Array>,
+        mean_coefficients: Option<Array> as Option<Vec<f64>>,
         /// The score of the selection. Greater is better.
         score: f64,
         /// Derivatives of the score in the logarithms of the free parameters, in the order of `vary`.
         ///
         /// For `length_scales` without an axis, the derivative is in the logarithm of a common factor of all
         /// length scales. Null for `nu`, which takes steps.
-        #[schema(value_type = Vec<Option<f64>>)]
-        gradient: Vec<Nullable>,
+        gradient: Vec<Nullable> as Vec<Option<f64>>,
         /// True if no slope is left to follow within the bounds.
         converged: bool,
         /// Number of evaluations of the score.
@@ -201,6 +173,7 @@ answer! {
     }
 }
 
+operation! {
 /// Select a model
 ///
 /// Searches the kernel and the noise that explain the values best, by marginal likelihood, leave-one-out or
@@ -211,21 +184,8 @@ answer! {
 /// The answer has the selection, the score over alpha, and predictions of each value from all others. Every
 /// evaluation costs a few factorizations, so clouds may have at most 5,000 points. For larger clouds, select
 /// on a sample of the points, and send the result with all of them.
-#[utoipa::path(
-    post,
-    path = "/v1/model-selection",
-    operation_id = "select_model",
-    tag = "values",
-    request_body = ModelSelectionRequest,
-    responses((status = 200, description = "What explains the values best", body = ModelSelectionResponse), ComputeProblems),
-    security((), ("bearer" = []))
-)]
-pub async fn select_model(
-    State(app): State<Arc<App>>,
-    Extension(owner): Extension<Owner>,
-    request: Request,
-) -> Result<Response, Problem> {
-    serve::<ModelSelectionRequest>(app, owner, request).await
+pub async fn select_model(ModelSelectionRequest) -> ModelSelectionResponse;
+path: "/v1/model-selection", tag: "values", answer: "What explains the values best"
 }
 
 /// Number of α on a path.
@@ -242,10 +202,8 @@ const MAX_PATH_POINTS: usize = 3000;
 const MAX_POINTS: usize = 5000;
 
 impl Operation for ModelSelectionRequest {
-    const NAME: &'static str = "select_model";
     type Work = Work;
     type Answer = ModelSelectionResponse;
-    const HAS_SURFACE: bool = false;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let search = Search::of(&self)?;
@@ -267,7 +225,7 @@ impl Operation for ModelSelectionRequest {
         }
         search.check_axes_of(d)?;
         let n_numbers = planner.check_answer(n.checked_mul(3).and_then(|n| n.checked_add(4 * N_ALPHAS)))?;
-        let cost = Cost { work: search.price((n, d), main.n_length_scales()), n_numbers, n_held: n };
+        let cost = Cost { work: search.price(n, d, main.n_length_scales()), n_numbers, n_held: n };
         Ok(Plan { main: main.into(), surface: None, work: Work { values, search }, cost })
     }
 

@@ -185,10 +185,8 @@ struct Numbers {
 impl AsRef<[u8]> for Numbers {
     fn as_ref(&self) -> &[u8] {
         let factor = self.stored.model().solver().ok().and_then(|solver| solver.factor());
-        let numbers = factor.map_or(&[][..], |factor| match self.of_weights {
-            true => factor.weights_of_one,
-            false => factor.numbers,
-        });
+        let numbers = factor
+            .map_or(&[][..], |factor| if self.of_weights { factor.weights_of_one } else { factor.numbers });
         bytemuck::cast_slice(numbers)
     }
 }

@@ -116,9 +116,10 @@ async fn reserve_for_reading(
         return Err(Problem::internal());
     }
     let mut memory = app.intake.try_reserve(owner, 0).ok_or_else(Problem::internal)?;
-    match app.intake.grow(&mut memory, n_reserved, PATIENCE).await {
-        true => Ok(memory),
-        false => Err(app.compute.out_of_memory()),
+    if app.intake.grow(&mut memory, n_reserved, PATIENCE).await {
+        Ok(memory)
+    } else {
+        Err(app.compute.out_of_memory())
     }
 }
 
@@ -244,7 +245,8 @@ pub async fn retain(app: Arc<App>) {
         }
         let now = SystemTime::now();
         let knows = |name: &OwnerName| app.keys.owner_named(name).is_some();
-        if let Err(error) = durable.objects.sweep_jobs(knows, app.config.job_retention(), now).await {
+        let (kept, longest) = app.config.job_retention();
+        if let Err(error) = durable.objects.sweep_jobs(knows, kept, longest, now).await {
             tracing::error!(%error, "jobs of keys that are gone are not let go");
         }
         match durable.objects.sweep(app.config.retention(), now).await {

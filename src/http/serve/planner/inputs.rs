@@ -175,11 +175,10 @@ const MAX_SEED: u64 = (1 << 53) - 1;
 /// # Errors
 /// 422 for a seed that some clients cannot represent.
 pub fn check_seed(seed: u64, pointer: &str) -> Result<(), Problem> {
-    match seed <= MAX_SEED {
-        true => Ok(()),
-        false => {
-            Err(Problem::invalid_request(pointer, format!("a seed is at most {MAX_SEED}, found {seed}")))
-        }
+    if seed <= MAX_SEED {
+        Ok(())
+    } else {
+        Err(Problem::invalid_request(pointer, format!("a seed is at most {MAX_SEED}, found {seed}")))
     }
 }
 

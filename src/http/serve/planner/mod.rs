@@ -275,9 +275,10 @@ impl<'a> Planner<'a> {
             return Err(Problem::invalid_request("/geometry", detail));
         }
         let has_own_process = geometry.kernel.is_some() || !inherits_noise;
-        let (alpha, noise_variances) = match inherits_noise {
-            true => (options.alpha, options.noise_variances),
-            false => (geometry.alpha, geometry.noise_variances),
+        let (alpha, noise_variances) = if inherits_noise {
+            (options.alpha, options.noise_variances)
+        } else {
+            (geometry.alpha, geometry.noise_variances)
         };
         let options = FitOptions {
             kernel: geometry.kernel.or(options.kernel),
@@ -303,9 +304,10 @@ impl<'a> Planner<'a> {
         let is_local = solver == SolverChoice::Local
             || request.model == SurfaceModel::Local
             || solver == SolverChoice::Auto && is_beyond;
-        let options = match is_local && !has_own_process {
-            true => FitOptions { solver, ..FitOptions::default() },
-            false => options,
+        let options = if is_local && !has_own_process {
+            FitOptions { solver, ..FitOptions::default() }
+        } else {
+            options
         };
         self.plan_surface(on, options, Purpose::Curvatures, request)
     }

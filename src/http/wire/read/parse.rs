@@ -5,7 +5,6 @@ use serde_json::error::Category;
 
 use super::guarded::{Guard, Stop, shortened};
 use super::limits::ParseContext;
-use super::members::object;
 use super::plain_json;
 use crate::http::problem::slug::Slug;
 use crate::http::problem::{Pointers, Problem};
@@ -22,7 +21,7 @@ const MAX_NESTING: usize = 128;
 /// - 422 `invalid-request` with a pointer for JSON that is not a `T`.
 pub fn parse_json<T: DeserializeOwned>(bytes: &[u8], context: &ParseContext<'_>) -> Result<T, Problem> {
     let guard = Guard::new(context);
-    if let Some(request) = plain_json::from_slice(bytes, |json| object(guard.around(json))) {
+    if let Some(request) = plain_json::from_slice(bytes, |json| T::deserialize(guard.around(json))) {
         return Ok(request);
     }
     if let Some(stop) = guard.stop() {
@@ -30,8 +29,8 @@ pub fn parse_json<T: DeserializeOwned>(bytes: &[u8], context: &ParseContext<'_>)
     }
     let guard = Guard::asking_for_any(context);
     let mut deserializer = serde_json::Deserializer::from_slice(bytes);
-    let parsed =
-        object(guard.around(&mut deserializer)).and_then(|request| deserializer.end().map(|()| request));
+    let parsed = T::deserialize(guard.around(&mut deserializer))
+        .and_then(|request| deserializer.end().map(|()| request));
     parsed.map_err(|error| refusal(&error, &guard, context, bytes))
 }
 
@@ -104,7 +103,6 @@ mod tests {
     use std::sync::atomic::Ordering::Relaxed;
 
     use super::*;
-    use crate::http::wire::read::members::present;
     use crate::http::wire::read::points::Points;
     use gramian_numerics::observer::{Observer, Stage};
 
@@ -112,7 +110,6 @@ mod tests {
     #[serde(deny_unknown_fields)]
     struct Request {
         points: Points,
-        #[serde(default, deserialize_with = "present")]
         alpha: Option<f64>,
     }
 

@@ -247,20 +247,17 @@ mod tests {
     use serde::Deserialize;
 
     use super::*;
-    use crate::http::wire::read::members::present;
+    use crate::http::wire::read::guarded::Guard;
+    use crate::http::wire::read::limits::ParseContext;
     use crate::http::wire::read::points::Points;
 
     #[derive(Debug, Deserialize)]
     #[serde(deny_unknown_fields)]
     struct Request {
         points: Points,
-        #[serde(default, deserialize_with = "present")]
         values: Option<Vec<f64>>,
-        #[serde(default, deserialize_with = "present")]
         name: Option<String>,
-        #[serde(default, deserialize_with = "present")]
         count: Option<u8>,
-        #[serde(default, deserialize_with = "present")]
         is_plain: Option<bool>,
     }
 
@@ -274,7 +271,8 @@ mod tests {
     }
 
     fn plain(text: &[u8]) -> Option<String> {
-        from_slice(text, |json| Request::deserialize(json)).as_ref().map(described)
+        let guard = Guard::new(&ParseContext::UNLIMITED);
+        from_slice(text, |json| Request::deserialize(guard.around(json))).as_ref().map(described)
     }
 
     fn by_serde_json(text: &[u8]) -> Option<String> {

@@ -29,15 +29,17 @@ pub trait Answer {
 }
 
 /// Declares an answer: its schema for the `OpenAPI` document and its [`Answer`] implementation.
+///
+/// `as` names the type of a member in the document, where it differs from the type in the code.
 macro_rules! answer {
     (
         $(#[$meta:meta])*
-        pub struct $name:ident { $($(#[$field_meta:meta])* $field:ident: $type:ty,)* }
+        pub struct $name:ident { $($(#[$field_meta:meta])* $field:ident: $type:ty $(as $schema:ty)?,)* }
     ) => {
         $(#[$meta])*
         #[derive(utoipa::ToSchema)]
         pub struct $name {
-            $($(#[$field_meta])* $field: $type,)*
+            $($(#[$field_meta])* $(#[schema(value_type = $schema)])? $field: $type,)*
         }
 
         impl $crate::http::wire::write::answer::Answer for $name {
@@ -50,6 +52,22 @@ macro_rules! answer {
     };
 }
 pub(crate) use answer;
+
+/// Makes types members that are JSON in every format.
+macro_rules! json_members {
+    ($($type:ty),*) => {
+        $(impl $crate::http::wire::write::answer::Member for $type {
+            fn add_to(
+                self,
+                name: &'static str,
+                parts: &mut $crate::http::wire::write::answer::Parts,
+            ) -> Result<(), $crate::http::problem::Problem> {
+                parts.add_json(name, &self)
+            }
+        })*
+    };
+}
+pub(crate) use json_members;
 
 /// A value that can be a member of an answer.
 pub trait Member {
@@ -83,23 +101,7 @@ impl<T: Serialize> Member for Vec<T> {
     }
 }
 
-impl Member for f64 {
-    fn add_to(self, name: &'static str, parts: &mut Parts) -> Result<(), Problem> {
-        parts.add_json(name, &self)
-    }
-}
-
-impl Member for bool {
-    fn add_to(self, name: &'static str, parts: &mut Parts) -> Result<(), Problem> {
-        parts.add_json(name, &self)
-    }
-}
-
-impl Member for usize {
-    fn add_to(self, name: &'static str, parts: &mut Parts) -> Result<(), Problem> {
-        parts.add_json(name, &self)
-    }
-}
+json_members!(f64, bool, usize);
 
 /// An absent value is left out, not written as null.
 impl<M: Member> Member for Option<M> {
@@ -231,11 +233,9 @@ mod tests {
         /// An answer.
         pub struct Sample {
             /// Numbers.
-            #[schema(value_type = Vec<f64>)]
-            values: Array,
+            values: Array as Vec<f64>,
             /// None.
-            #[schema(value_type = Option<Vec<f64>>)]
-            gradients: Option<Array>,
+            gradients: Option<Array> as Option<Vec<f64>>,
             /// Words.
             surfaces: Vec<&'static str>,
             /// A number.

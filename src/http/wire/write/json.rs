@@ -5,6 +5,7 @@
 //! `OpenAPI` document allows.
 
 use std::io;
+use std::time::SystemTime;
 
 use axum::http::{HeaderValue, header};
 use axum::response::{IntoResponse, Response};
@@ -54,6 +55,11 @@ impl Serialize for Nullable {
             }
         }
     }
+}
+
+/// Returns a time as answers have it: RFC 3339 in UTC, with milliseconds.
+pub fn timestamp(time: SystemTime) -> String {
+    humantime::format_rfc3339_millis(time).to_string()
 }
 
 /// A JSON answer whose numbers come from the server itself.

@@ -111,9 +111,10 @@ impl Stepped {
         let effect = async {
             let was_there = self.inner.head(&name).await.is_ok();
             self.inner.delete(&name).await?;
-            match was_there || !self.gate.tells_absence.load(Ordering::Relaxed) {
-                true => Ok(name.clone()),
-                false => Err(Error::NotFound { path: name.to_string(), source: "absent".into() }),
+            if was_there || !self.gate.tells_absence.load(Ordering::Relaxed) {
+                Ok(name.clone())
+            } else {
+                Err(Error::NotFound { path: name.to_string(), source: "absent".into() })
             }
         };
         self.gate.change(effect).await

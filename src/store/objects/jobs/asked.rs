@@ -23,6 +23,13 @@ pub struct FoundRequest {
     pub body: BoxStream<'static, Result<Bytes, BrokenOff>>,
 }
 
+/// A job that begins with its request.
+pub struct NewJob<'a> {
+    pub id: JobId,
+    pub request: &'a JobRequest,
+    pub body: Bytes,
+}
+
 impl Objects {
     /// Writes a request within its room, and marks its job as open.
     ///
@@ -30,11 +37,11 @@ impl Objects {
     /// [`Unavailable`].
     pub async fn put_job(
         &self,
-        (owner, id): (&OwnerName, JobId),
-        request: &JobRequest,
-        body: Bytes,
+        owner: &OwnerName,
+        job: NewJob<'_>,
         room: &mut Room,
     ) -> Result<(), Unavailable> {
+        let NewJob { id, request, body } = job;
         let line = line_of(request);
         let mut hasher = blake3::Hasher::new();
         hasher.update(&line);

@@ -37,7 +37,7 @@ use serde::Serialize;
 use uuid::Uuid;
 
 use super::{Objects, OwnerName, Unavailable};
-pub use asked::{FoundRequest, JobRequest};
+pub use asked::{FoundRequest, JobRequest, NewJob};
 pub use claims::{Claim, ClaimName, KeyHash};
 pub use leases::Lease;
 pub use results::{Answer, FoundResult, JobResult, Outcome};
@@ -200,7 +200,8 @@ impl Objects {
     pub async fn sweep_jobs(
         &self,
         knows: impl Fn(&OwnerName) -> bool,
-        (kept, longest): (Duration, Duration),
+        kept: Duration,
+        longest: Duration,
         now: SystemTime,
     ) -> Result<(), Unavailable> {
         for owner in self.owners().await?.into_iter().filter(|owner| !knows(owner)) {

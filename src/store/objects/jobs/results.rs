@@ -64,7 +64,8 @@ impl Objects {
     /// [`Unavailable`], also if the body breaks off or exceeds its room.
     pub async fn put_result<E: std::fmt::Display>(
         &self,
-        (owner, id): (&OwnerName, JobId),
+        owner: &OwnerName,
+        id: JobId,
         Answer { attempt, head, body }: Answer<impl Stream<Item = Result<Bytes, E>>>,
         room: &mut Room,
     ) -> Result<bool, Unavailable> {

@@ -28,7 +28,7 @@ async fn put(
     body: impl Stream<Item = Result<Bytes, String>>,
 ) -> Result<bool, Unavailable> {
     let answer = Answer { attempt, head: head(), body };
-    objects.put_result((&owner(), id), answer, &mut Room::unlimited()).await
+    objects.put_result(&owner(), id, answer, &mut Room::unlimited()).await
 }
 
 async fn read(objects: &Arc<Objects>, id: JobId) -> Option<Result<Vec<u8>, BrokenOff>> {
@@ -46,7 +46,10 @@ async fn asked(objects: &Objects, body: &'static [u8]) -> JobId {
     let id = JobId::new();
     let request = JobRequest { path: "/v1/normals".to_owned(), headers: Vec::new() };
     let room = &mut Room::unlimited();
-    objects.put_job((&owner(), id), &request, Bytes::from_static(body), room).await.unwrap();
+    objects
+        .put_job(&owner(), NewJob { id, request: &request, body: Bytes::from_static(body) }, room)
+        .await
+        .unwrap();
     id
 }
 
@@ -64,7 +67,7 @@ async fn what_is_asked_and_what_comes_of_it_is_read_as_it_was_written() {
     let request = JobRequest { path: "/v1/normals".to_owned(), headers };
     let points = Bytes::from_static(b"{}\n");
     let room = &mut Room::unlimited();
-    objects.put_job((&owner(), id), &request, points.clone(), room).await.unwrap();
+    objects.put_job(&owner(), NewJob { id, request: &request, body: points.clone() }, room).await.unwrap();
     let found = objects.open_job(&owner(), id).await.unwrap().unwrap().unwrap();
     assert_eq!((found.request, found.n_body_bytes), (request, 3));
     assert_eq!(found.body.try_collect::<Vec<_>>().await.unwrap().concat(), points);
@@ -188,10 +191,10 @@ async fn jobs_of_owners_that_are_gone_go_with_their_time() {
     let objects = Arc::new(Objects::in_memory());
     let (ended, open) = (asked(&objects, b"body").await, asked(&objects, b"body").await);
     assert!(put(&objects, ended, 0, body(&[b"text"])).await.unwrap());
-    let times = (Duration::from_secs(60), Duration::from_secs(600));
+    let (kept, longest) = (Duration::from_secs(60), Duration::from_secs(600));
     let sweep = async |knows: bool, seconds| {
         let now = SystemTime::now() + Duration::from_secs(seconds);
-        objects.sweep_jobs(|name| knows && *name == owner(), times, now).await.unwrap();
+        objects.sweep_jobs(|name| knows && *name == owner(), kept, longest, now).await.unwrap();
         let there = objects.jobs(&owner()).await.unwrap();
         there.into_iter().map(|job| job.id).collect::<Vec<_>>()
     };
@@ -270,7 +273,7 @@ async fn what_is_read_in_memory_is_there_once_and_paid_for_until_it_is_read() {
     let mut room = Room::of(&budget, Owner(0), 0).unwrap();
     let piece = || Ok::<_, String>(Bytes::from(vec![7; N_BYTES]));
     let answer = Answer { attempt: 0, head: head(), body: futures_util::stream::iter([piece(), piece()]) };
-    assert!(objects.put_result((&owner(), id), answer, &mut room).await.unwrap());
+    assert!(objects.put_result(&owner(), id, answer, &mut room).await.unwrap());
     assert!(!room.is_exceeded() && room.into_reservation().is_none());
     let held = budget.n_held();
     assert!((2 * N_BYTES..2 * N_BYTES + 8192).contains(&held), "{held}");
@@ -291,6 +294,6 @@ async fn what_is_read_in_memory_is_there_once_and_paid_for_until_it_is_read() {
     let mut room = Room::of(&Budget::new(3 * N_BYTES, 1), Owner(0), 0).unwrap();
     let id = asked(&objects, b"").await;
     let answer = Answer { attempt: 0, head: head(), body: futures_util::stream::iter([piece(), piece()]) };
-    assert!(objects.put_result((&owner(), id), answer, &mut room).await.is_err() && room.is_exceeded());
+    assert!(objects.put_result(&owner(), id, answer, &mut room).await.is_err() && room.is_exceeded());
     assert!(objects.get_result(&owner(), id).await.unwrap().is_none());
 }

@@ -1,27 +1,18 @@
 //! `POST /v1/interpolation/batch`: functions through many lists of values, with one factorization.
 
-use std::sync::Arc;
-
-use axum::Extension;
-use axum::extract::{Request, State};
-use axum::response::Response;
-
 use super::{Work, arrays, checked_order, deviations_per_query, has_deviations, numbers_per_query};
 use crate::http::compute::JobObserver;
 use crate::http::fields::{Diagnostics, Fit, MeanChoice, ValuesInclude, request};
-use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
+use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
-use crate::http::serve::operation::{Operation, Plan, serve};
+use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::plan::Cost;
 use crate::http::serve::planner::{DenseOnly, Planner, value_lists};
 use crate::http::serve::values::mean_coefficients;
-use crate::http::state::app::App;
-use crate::http::wire::read::members::{present, present_word, present_words};
 use crate::http::wire::read::points::{Points, ValueLists};
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
-use crate::store::Owner;
 use gramian_numerics::function::price::many_price;
 use gramian_numerics::machine::price::Sizes;
 use gramian_numerics::model::EachAt;
@@ -37,20 +28,14 @@ request! {
         #[schema(value_type = Vec<Vec<f64>>, min_items = 1)]
         pub values: ValueLists,
         /// The mean of each function. Default: a constant if `kernel` is absent too, else 0.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
         /// The points to evaluate at, one row of coordinates each. Default: the points of the cloud.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The highest order of derivatives: 0 for values, 1 adds gradients, 2 adds Hessians. Default: 0.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, minimum = 0, maximum = 2)]
+        #[schema(minimum = 0, maximum = 2)]
         pub derivatives: Option<u8>,
         /// Optional parts of the answer. Default: none.
-        #[serde(default, deserialize_with = "present_words")]
-        #[schema(nullable = false)]
         pub include: Option<Vec<ValuesInclude>>,
     }
 }
@@ -59,72 +44,51 @@ answer! {
     /// The interpolants (regression functions, if alpha > 0) at the queries. All have the same deviations.
     pub struct InterpolationBatchResponse {
         /// Values u at each query, a row per list.
-        #[schema(value_type = Vec<Vec<f64>>)]
-        values: Array,
+        values: Array as Vec<Vec<f64>>,
         /// Gradients ∇u at each query for each list, unit of the values per length.
         ///
         /// Present if `derivatives` is 1 or 2.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
-        gradients: Option<Array>,
+        gradients: Option<Array> as Option<Vec<Vec<Vec<f64>>>>,
         /// Hessians D²u at each query for each list, unit of the values per length squared.
         ///
         /// Present if `derivatives` is 2.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<Vec<f64>>>>>)]
-        hessians: Option<Array>,
+        hessians: Option<Array> as Option<Vec<Vec<Vec<Vec<f64>>>>>,
         /// Standard deviation of each function at each query, given its values. Present if `include` has
         /// `deviations`.
         ///
         /// The kernel is taken as covariance, and alpha as variance of the noise. All lists have the same
         /// deviations.
-        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
-        value_deviations: Option<Array>,
+        value_deviations: Option<Array> as Option<Vec<f64>>,
         /// Standard deviation of each component of ∇u at each query.
         ///
         /// Present if `include` has `deviations` and `derivatives` is 1 or 2.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
-        gradient_deviations: Option<Array>,
+        gradient_deviations: Option<Array> as Option<Vec<Vec<f64>>>,
         /// Standard deviation of each entry of D²u at each query.
         ///
         /// Present if `include` has `deviations` and `derivatives` is 2.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
-        hessian_deviations: Option<Array>,
+        hessian_deviations: Option<Array> as Option<Vec<Vec<Vec<f64>>>>,
         /// The mean of each function, a row per list. Absent if the mean is 0.
         ///
         /// A row is the constant, followed by a slope per coordinate if the mean is linear.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
-        mean_coefficients: Option<Array>,
+        mean_coefficients: Option<Array> as Option<Vec<Vec<f64>>>,
         /// The numbers used, the method, its accuracy, and warnings. `relative_residual` is the largest of
         /// all lists.
         diagnostics: Diagnostics,
     }
 }
 
+operation! {
 /// Interpolate many lists of values
 ///
 /// Interpolates each list as `/v1/interpolation` does, with one factorization for all lists. A kernel that is
 /// not given is learned from all lists together. Batches need the dense solver.
-#[utoipa::path(
-    post,
-    path = "/v1/interpolation/batch",
-    operation_id = "compute_interpolation_batch",
-    tag = "values",
-    request_body = InterpolationBatchRequest,
-    responses((status = 200, description = "The functions at the queries", body = InterpolationBatchResponse), ComputeProblems),
-    security((), ("bearer" = []))
-)]
-pub async fn compute_interpolation_batch(
-    State(app): State<Arc<App>>,
-    Extension(owner): Extension<Owner>,
-    request: Request,
-) -> Result<Response, Problem> {
-    serve::<InterpolationBatchRequest>(app, owner, request).await
+pub async fn compute_interpolation_batch(InterpolationBatchRequest) -> InterpolationBatchResponse;
+path: "/v1/interpolation/batch", tag: "values", answer: "The functions at the queries"
 }
 
 impl Operation for InterpolationBatchRequest {
-    const NAME: &'static str = "compute_interpolation_batch";
     type Work = Work;
     type Answer = InterpolationBatchResponse;
-    const HAS_SURFACE: bool = false;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let derivatives = checked_order(self.derivatives)?;
@@ -163,7 +127,7 @@ impl Operation for InterpolationBatchRequest {
         let Work { queries, derivatives, .. } = work;
         let (k, m, d) = (batch.solutions.len(), queries.n_points(), queries.dimension());
         let [value_deviations, gradient_deviations, hessian_deviations] =
-            arrays(deviations, (m, d), derivatives);
+            arrays(deviations, &queries, derivatives);
         Ok(InterpolationBatchResponse {
             values: Array::new(jets.values, &[k, m]),
             gradients: (derivatives >= 1).then(|| Array::new(jets.gradients, &[k, m, d])),

@@ -4,24 +4,17 @@ mod batch;
 
 use std::sync::Arc;
 
-use axum::Extension;
-use axum::extract::{Request, State};
-use axum::response::Response;
-
 use crate::http::compute::JobObserver;
 use crate::http::fields::{Diagnostics, Fit, MeanChoice, ValuesInclude, request};
-use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
+use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
-use crate::http::serve::operation::{Operation, Plan, serve};
+use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::plan::{Cost, Values};
 use crate::http::serve::planner::{GivenValues, Planner};
-use crate::http::state::app::App;
-use crate::http::wire::read::members::{present, present_word, present_words};
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
-use crate::store::Owner;
 pub use batch::*;
 use gramian_numerics::function::deviations::JetDeviations;
 use gramian_numerics::machine::price::Sizes;
@@ -37,20 +30,14 @@ request! {
         #[schema(min_items = 1)]
         pub values: Vec<f64>,
         /// The mean of the function. Default: a constant if `kernel` is absent too, else 0.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
         /// The points to evaluate at, one row of coordinates each. Default: the points of the cloud.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The highest order of derivatives: 0 for values, 1 adds gradients, 2 adds Hessians. Default: 0.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, minimum = 0, maximum = 2)]
+        #[schema(minimum = 0, maximum = 2)]
         pub derivatives: Option<u8>,
         /// Optional parts of the answer. Default: none.
-        #[serde(default, deserialize_with = "present_words")]
-        #[schema(nullable = false)]
         pub include: Option<Vec<ValuesInclude>>,
     }
 }
@@ -59,54 +46,36 @@ answer! {
     /// The interpolant (regression function, if alpha > 0) at the queries.
     pub struct InterpolationResponse {
         /// u at each query.
-        #[schema(value_type = Vec<f64>)]
-        values: Array,
+        values: Array as Vec<f64>,
         /// ∇u at each query, unit of the values per length. Present if `derivatives` is 1 or 2.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
-        gradients: Option<Array>,
+        gradients: Option<Array> as Option<Vec<Vec<f64>>>,
         /// D²u at each query, unit of the values per length squared. Present if `derivatives` is 2.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
-        hessians: Option<Array>,
+        hessians: Option<Array> as Option<Vec<Vec<Vec<f64>>>>,
         /// Standard deviation of u at each query, given the values. Present if `include` has `deviations`.
         ///
         /// The kernel is taken as covariance, and alpha as variance of the noise.
-        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
-        value_deviations: Option<Array>,
+        value_deviations: Option<Array> as Option<Vec<f64>>,
         /// Standard deviation of each component of ∇u at each query.
         ///
         /// Present if `include` has `deviations` and `derivatives` is 1 or 2.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
-        gradient_deviations: Option<Array>,
+        gradient_deviations: Option<Array> as Option<Vec<Vec<f64>>>,
         /// Standard deviation of each entry of D²u at each query.
         ///
         /// Present if `include` has `deviations` and `derivatives` is 2.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
-        hessian_deviations: Option<Array>,
+        hessian_deviations: Option<Array> as Option<Vec<Vec<Vec<f64>>>>,
         /// The numbers used, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
     }
 }
 
+operation! {
 /// Interpolate values
 ///
 /// Fits `u = Σ λ_j k(·, x_j)` to the values, Λ = (K + αI)⁻¹Y, and evaluates u with its derivatives at the
 /// queries. If alpha = 0, u takes the values at the points exactly. With `"solver": "local"`, and for clouds
 /// that are too large to be factorized, each query is answered from the points nearest to it.
-#[utoipa::path(
-    post,
-    path = "/v1/interpolation",
-    operation_id = "compute_interpolation",
-    tag = "values",
-    request_body = InterpolationRequest,
-    responses((status = 200, description = "The function at the queries", body = InterpolationResponse), ComputeProblems),
-    security((), ("bearer" = []))
-)]
-pub async fn compute_interpolation(
-    State(app): State<Arc<App>>,
-    Extension(owner): Extension<Owner>,
-    request: Request,
-) -> Result<Response, Problem> {
-    serve::<InterpolationRequest>(app, owner, request).await
+pub async fn compute_interpolation(InterpolationRequest) -> InterpolationResponse;
+path: "/v1/interpolation", tag: "values", answer: "The function at the queries"
 }
 
 /// A checked request for one list of values or many.
@@ -129,10 +98,8 @@ impl Work {
 }
 
 impl Operation for InterpolationRequest {
-    const NAME: &'static str = "compute_interpolation";
     type Work = Work;
     type Answer = InterpolationResponse;
-    const HAS_SURFACE: bool = false;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let derivatives = checked_order(self.derivatives)?;
@@ -160,7 +127,7 @@ impl Operation for InterpolationRequest {
         let clamped = deviations.as_ref().map_or(&[][..], |deviations| &deviations.clamped);
         diagnostics.warn_of_clamping(clamped);
         let (m, d) = (jets.n_queries(), jets.dimension());
-        let [of_values, of_gradients, of_hessians] = arrays(deviations, (m, d), work.derivatives);
+        let [of_values, of_gradients, of_hessians] = arrays(deviations, &work.queries, work.derivatives);
         Ok(InterpolationResponse {
             values: Array::new(jets.values(), &[m]),
             gradients: (work.derivatives >= 1).then(|| Array::new(jets.gradients(), &[m, d])),
@@ -199,7 +166,8 @@ fn deviations_per_query(d: usize, derivatives: u8) -> usize {
 }
 
 /// Returns the deviations of values, gradients and Hessians as arrays, up to the order of `derivatives`.
-fn arrays(deviations: Option<JetDeviations>, (m, d): (usize, usize), derivatives: u8) -> [Option<Array>; 3] {
+fn arrays(deviations: Option<JetDeviations>, queries: &Cloud, derivatives: u8) -> [Option<Array>; 3] {
+    let (m, d) = (queries.n_points(), queries.dimension());
     let Some(JetDeviations { values, gradients, hessians, .. }) = deviations else {
         return [None, None, None];
     };

@@ -119,7 +119,7 @@ impl Search {
     }
 
     /// Returns the expected price of the search, from the number of evaluations that descents usually take.
-    pub(super) fn price(&self, (n, d): (usize, usize), n_length_scales: usize) -> Price {
+    pub(super) fn price(&self, n: usize, d: usize, n_length_scales: usize) -> Price {
         let is_of_axes =
             |free: &FreeParameter| free.parameter == SelectionParameter::LengthScales && free.axis.is_none();
         let n_free = match &self.vary {
@@ -132,9 +132,10 @@ impl Search {
         let threads = (n_descents, rayon::current_num_threads());
         let price = selection_price((n, d), self.criterion, n_free, n_evaluations, threads)
             .and(leave_one_out_price(n, 1 + d));
-        match n <= MAX_PATH_POINTS {
-            true => price.and(alpha_path_price((n, d), self.criterion, 1 + d, N_ALPHAS)),
-            false => price,
+        if n <= MAX_PATH_POINTS {
+            price.and(alpha_path_price((n, d), self.criterion, 1 + d, N_ALPHAS))
+        } else {
+            price
         }
     }
 
@@ -152,11 +153,14 @@ impl Search {
             (KernelFamily::Wendland, _) => vec![Family::Wendland { smoothness: WendlandSmoothness::C4 }],
             (KernelFamily::Matern, _) => self.matern(start),
         };
-        match self.families.is_empty() {
-            true if matches!(start, Family::Matern { .. }) => self.matern(start),
-            true if self.orders.is_some() => [vec![start], self.matern(start)].concat(),
-            true => vec![start],
-            false => self.families.iter().flat_map(given).collect(),
+        if !self.families.is_empty() {
+            self.families.iter().flat_map(given).collect()
+        } else if matches!(start, Family::Matern { .. }) {
+            self.matern(start)
+        } else if self.orders.is_some() {
+            [vec![start], self.matern(start)].concat()
+        } else {
+            vec![start]
         }
     }
 
@@ -257,9 +261,12 @@ impl Work {
         let report = Report::of_function(&solver, &solution, scale);
         let diagnostics = fits.main.diagnostics(&report, plan.stored.cloud.n_points());
         let start = scaled(solver.kernel(), solver.regularization(), scale);
-        let start = start.map_err(|error| match plan.process.is_learned {
-            true => Problem::invalid_request("/values", BEYOND_KERNELS),
-            false => plan.refused(error),
+        let start = start.map_err(|error| {
+            if plan.process.is_learned {
+                Problem::invalid_request("/values", BEYOND_KERNELS)
+            } else {
+                plan.refused(error)
+            }
         })?;
         let variations = search.variations(&start);
         let vary: Vec<Variation> = variations.iter().map(|(_, variation)| *variation).collect();

@@ -1,28 +1,18 @@
 //! `POST /v1/posterior/batch`: Gaussian process posteriors of many lists of values, with one factorization.
 
-use std::sync::Arc;
-
-use axum::Extension;
-use axum::extract::{Request, State};
-use axum::response::Response;
-
 use super::work::{Asked, Found, Work};
 use super::{PosteriorQuantity, Samples};
 use crate::http::compute::JobObserver;
 use crate::http::fields::{Diagnostics, Fit, MeanChoice, request};
-use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
+use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
-use crate::http::serve::operation::{Operation, Plan, serve};
+use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::planner::{Planner, value_lists};
-use crate::http::state::app::App;
-use crate::http::wire::read::members::{
-    present, present_object, present_unless_empty, present_word, present_words,
-};
+use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::{Points, ValueLists};
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
-use crate::store::Owner;
 
 request! {
     /// Many lists of noisy values at the points of a cloud, and queries for their posteriors.
@@ -33,30 +23,21 @@ request! {
         #[schema(value_type = Vec<Vec<f64>>, min_items = 1)]
         pub values: ValueLists,
         /// The mean of each process. Default: a constant if `kernel` is absent too, else 0.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
         /// The points to evaluate at, one row of coordinates each. Default: the points of the cloud.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// Optional parts of the answer beside the means. Default: none.
-        #[serde(default, deserialize_with = "present_words")]
-        #[schema(nullable = false)]
         pub include: Option<Vec<PosteriorQuantity>>,
         /// Joint draws of each latent function at all queries. Default: none.
-        #[serde(default, deserialize_with = "present_object")]
-        #[schema(nullable = false)]
         pub samples: Option<Samples>,
         /// Probabilities between 0 and 1 for quantiles of the latent functions. Default: none.
         ///
         /// An empty list counts as absent.
         #[serde(default, deserialize_with = "present_unless_empty")]
-        #[schema(nullable = false, max_items = 1000)]
+        #[schema(max_items = 1000)]
         pub quantiles: Option<Vec<f64>>,
         /// The threshold of `exceedance_probabilities` for a new observation, unit of the values.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false)]
         pub threshold: Option<f64>,
     }
 }
@@ -67,72 +48,47 @@ answer! {
     /// Each list has its own rows in everything that depends on its values. The lists share the rest.
     pub struct PosteriorBatchResponse {
         /// The posterior mean at each query, a row per list.
-        #[schema(value_type = Vec<Vec<f64>>)]
-        means: Array,
+        means: Array as Vec<Vec<f64>>,
         /// The variance of the latent functions at each query.
-        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
-        variances: Option<Array>,
+        variances: Option<Array> as Option<Vec<f64>>,
         /// The variance of a new observation at each query.
-        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
-        observation_variances: Option<Array>,
+        observation_variances: Option<Array> as Option<Vec<f64>>,
         /// The covariance of the latent functions between queries.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
-        covariance: Option<Array>,
+        covariance: Option<Array> as Option<Vec<Vec<f64>>>,
         /// The gradient of the mean at each query, for each list.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
-        gradients: Option<Array>,
+        gradients: Option<Array> as Option<Vec<Vec<Vec<f64>>>>,
         /// The variances of the components of the latent functions' gradients at each query.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
-        gradient_variances: Option<Array>,
+        gradient_variances: Option<Array> as Option<Vec<Vec<f64>>>,
         /// Draws of the latent function for each list. A draw is a row, with a number per query.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
-        samples: Option<Array>,
+        samples: Option<Array> as Option<Vec<Vec<Vec<f64>>>>,
         /// Quantiles of the latent function for each list. A probability is a row, with a number per query.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
-        quantiles: Option<Array>,
+        quantiles: Option<Array> as Option<Vec<Vec<Vec<f64>>>>,
         /// The probability that a new observation exceeds `threshold` at each query, a row per list.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
-        exceedance_probabilities: Option<Array>,
+        exceedance_probabilities: Option<Array> as Option<Vec<Vec<f64>>>,
         /// The log marginal likelihood of each list, −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
-        #[schema(nullable = false)]
         log_marginal_likelihoods: Option<Vec<f64>>,
         /// The mean of each function, a row per list. Absent if the mean is 0.
         ///
         /// A row is the constant, followed by a slope per coordinate if the mean is linear.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
-        mean_coefficients: Option<Array>,
+        mean_coefficients: Option<Array> as Option<Vec<Vec<f64>>>,
         /// The numbers used, the method, its accuracy, and warnings. `relative_residual` is the largest of
         /// all lists.
         diagnostics: Diagnostics,
     }
 }
 
+operation! {
 /// Compute Gaussian process posteriors of many lists of values
 ///
 /// Computes the posterior of each list as `/v1/posterior` does, with one factorization for all lists. A
 /// kernel that is not given is learned from all lists together. Batches need the dense solver.
-#[utoipa::path(
-    post,
-    path = "/v1/posterior/batch",
-    operation_id = "compute_posterior_batch",
-    tag = "values",
-    request_body = PosteriorBatchRequest,
-    responses((status = 200, description = "The posteriors at the queries", body = PosteriorBatchResponse), ComputeProblems),
-    security((), ("bearer" = []))
-)]
-pub async fn compute_posterior_batch(
-    State(app): State<Arc<App>>,
-    Extension(owner): Extension<Owner>,
-    request: Request,
-) -> Result<Response, Problem> {
-    serve::<PosteriorBatchRequest>(app, owner, request).await
+pub async fn compute_posterior_batch(PosteriorBatchRequest) -> PosteriorBatchResponse;
+path: "/v1/posterior/batch", tag: "values", answer: "The posteriors at the queries"
 }
 
 impl Operation for PosteriorBatchRequest {
-    const NAME: &'static str = "compute_posterior_batch";
     type Work = Work;
     type Answer = PosteriorBatchResponse;
-    const HAS_SURFACE: bool = false;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let given = value_lists(std::mem::take(&mut self.values))?;

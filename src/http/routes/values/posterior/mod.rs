@@ -3,29 +3,20 @@
 mod batch;
 mod work;
 
-use std::sync::Arc;
-
-use axum::Extension;
-use axum::extract::{Request, State};
-use axum::response::Response;
 use serde::Deserialize;
 use utoipa::ToSchema;
 
 use crate::http::compute::JobObserver;
 use crate::http::fields::{Diagnostics, Fit, MeanChoice, request};
-use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
+use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
-use crate::http::serve::operation::{Operation, Plan, serve};
+use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::planner::{GivenValues, Planner};
-use crate::http::state::app::App;
-use crate::http::wire::read::members::{
-    present, present_object, present_unless_empty, present_word, present_words,
-};
+use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
-use crate::store::Owner;
 pub use batch::*;
 use work::{Asked, Found, Work};
 
@@ -70,30 +61,21 @@ request! {
         #[schema(min_items = 1)]
         pub values: Vec<f64>,
         /// The mean of the process. Default: a constant if `kernel` is absent too, else 0.
-        #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
         /// The points to evaluate at, one row of coordinates each. Default: the points of the cloud.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// Optional parts of the answer beside the mean. Default: none.
-        #[serde(default, deserialize_with = "present_words")]
-        #[schema(nullable = false)]
         pub include: Option<Vec<PosteriorQuantity>>,
         /// Joint draws of the latent function at all queries. Default: none.
-        #[serde(default, deserialize_with = "present_object")]
-        #[schema(nullable = false)]
         pub samples: Option<Samples>,
         /// Probabilities between 0 and 1 for quantiles of the latent function. Default: none.
         ///
         /// An empty list counts as absent.
         #[serde(default, deserialize_with = "present_unless_empty")]
-        #[schema(nullable = false, max_items = 1000)]
+        #[schema(max_items = 1000)]
         pub quantiles: Option<Vec<f64>>,
         /// The threshold of `exceedance_probabilities` for a new observation, unit of the values.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false)]
         pub threshold: Option<f64>,
     }
 }
@@ -102,40 +84,31 @@ answer! {
     /// The Gaussian process given the values.
     pub struct PosteriorResponse {
         /// The posterior mean at each query, unit of the values.
-        #[schema(value_type = Vec<f64>)]
-        means: Array,
+        means: Array as Vec<f64>,
         /// The variance of the latent function at each query, no noise added, unit of the values squared.
-        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
-        variances: Option<Array>,
+        variances: Option<Array> as Option<Vec<f64>>,
         /// The variance of a new observation at each query.
-        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
-        observation_variances: Option<Array>,
+        observation_variances: Option<Array> as Option<Vec<f64>>,
         /// The covariance of the latent function between queries.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
-        covariance: Option<Array>,
+        covariance: Option<Array> as Option<Vec<Vec<f64>>>,
         /// The gradient of the mean at each query, unit of the values per length.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
-        gradients: Option<Array>,
+        gradients: Option<Array> as Option<Vec<Vec<f64>>>,
         /// The variances of the components of the latent function's gradient at each query.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
-        gradient_variances: Option<Array>,
+        gradient_variances: Option<Array> as Option<Vec<Vec<f64>>>,
         /// Draws of the latent function. A draw is a row, with a number per query.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
-        samples: Option<Array>,
+        samples: Option<Array> as Option<Vec<Vec<f64>>>,
         /// Quantiles of the latent function. A probability is a row, with a number per query.
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
-        quantiles: Option<Array>,
+        quantiles: Option<Array> as Option<Vec<Vec<f64>>>,
         /// The probability that a new observation exceeds `threshold`, at each query.
-        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
-        exceedance_probabilities: Option<Array>,
+        exceedance_probabilities: Option<Array> as Option<Vec<f64>>,
         /// The log marginal likelihood of the values, −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
-        #[schema(nullable = false)]
         log_marginal_likelihood: Option<f64>,
         /// The numbers used, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
     }
 }
 
+operation! {
 /// Compute the Gaussian process posterior
 ///
 /// Returns the posterior mean at the queries. The kernel is the prior covariance, and alpha (or
@@ -146,28 +119,13 @@ answer! {
 /// With `"solver": "local"`, and for clouds that are too large to be factorized, each query is answered from
 /// the points nearest to it. Covariance, samples and likelihood need all points or queries together, so they
 /// are then not available.
-#[utoipa::path(
-    post,
-    path = "/v1/posterior",
-    operation_id = "compute_posterior",
-    tag = "values",
-    request_body = PosteriorRequest,
-    responses((status = 200, description = "The posterior at the queries", body = PosteriorResponse), ComputeProblems),
-    security((), ("bearer" = []))
-)]
-pub async fn compute_posterior(
-    State(app): State<Arc<App>>,
-    Extension(owner): Extension<Owner>,
-    request: Request,
-) -> Result<Response, Problem> {
-    serve::<PosteriorRequest>(app, owner, request).await
+pub async fn compute_posterior(PosteriorRequest) -> PosteriorResponse;
+path: "/v1/posterior", tag: "values", answer: "The posterior at the queries"
 }
 
 impl Operation for PosteriorRequest {
-    const NAME: &'static str = "compute_posterior";
     type Work = Work;
     type Answer = PosteriorResponse;
-    const HAS_SURFACE: bool = false;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let given = GivenValues::one(std::mem::take(&mut self.values));

@@ -248,13 +248,12 @@ impl Found {
             means;
         let refused = |error| fits.main.refused(error);
         let function = || functions.first().ok_or_else(Problem::internal);
-        let covariance = match asked.needs_covariance() {
-            false => None,
-            true => {
-                let Interpolant { solver, solution } = function()?;
-                let found = covariance_with_mean(solver, solution.trend.as_ref(), queries, observer);
-                Some(found.map_err(refused)?.scaled(scale))
-            }
+        let covariance = if asked.needs_covariance() {
+            let Interpolant { solver, solution } = function()?;
+            let found = covariance_with_mean(solver, solution.trend.as_ref(), queries, observer);
+            Some(found.map_err(refused)?.scaled(scale))
+        } else {
+            None
         };
         let clamped = variances.as_ref().map(|v| &v.clamped).or(covariance.as_ref().map(|c| &c.clamped));
         let clamped = clamped.or(deviations.as_ref().map(|deviations| &deviations.clamped));
@@ -350,9 +349,10 @@ impl Bands<'_> {
         let (variances, threshold) = (self.variances?, self.asked.threshold?);
         let of_one = |(mean, variance): (&f64, &f64)| {
             let deviation = (variance + alpha).sqrt();
-            match deviation > 0.0 {
-                true => cumulative((mean - threshold) / deviation),
-                false => f64::from(u8::from(*mean > threshold)),
+            if deviation > 0.0 {
+                cumulative((mean - threshold) / deviation)
+            } else {
+                f64::from(u8::from(*mean > threshold))
             }
         };
         Some(self.means.iter().zip(variances.latent.iter().cycle()).map(of_one).collect())

@@ -13,8 +13,13 @@
 //!
 //! TEXT is shortened before a type sees it, because error messages repeat what they refuse. No valid name or
 //! word is as long as the limit.
+//!
+//! SHAPES are those of the contract: members are present or absent but never null, structs are objects, and
+//! enumerations are strings. serde alone would take null for absent, a list for a struct and an object for a
+//! word.
 
 mod entries;
+mod shapes;
 
 use std::borrow::Cow;
 use std::cell::{Cell, RefCell};
@@ -25,6 +30,7 @@ use serde::forward_to_deserialize_any;
 
 use super::limits::{Excess, List, ParseContext};
 use entries::Entries;
+use shapes::{Object, Word};
 
 /// Grants between two cancellation checks: some 100 µs of points.
 const GRANTS_PER_CHECK: u32 = 16;
@@ -160,10 +166,32 @@ impl<'de, D: Deserializer<'de>> Deserializer<'de> for Guarded<'_, D> {
         self.inner.deserialize_ignored_any(visitor)
     }
 
-    // Options and enumerations arrive through `members.rs`, as the types they hold and as strings.
+    /// A member that is there has a value: null is refused by the type that the option holds.
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, D::Error> {
+        visitor.visit_some(self)
+    }
+
+    fn deserialize_struct<V: Visitor<'de>>(
+        self,
+        _name: &'static str,
+        _fields: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, D::Error> {
+        self.deserialize_any(Object(visitor))
+    }
+
+    fn deserialize_enum<V: Visitor<'de>>(
+        self,
+        _name: &'static str,
+        _variants: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, D::Error> {
+        self.deserialize_any(Word(visitor))
+    }
+
     forward_to_deserialize_any! {
-        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 char str string bytes byte_buf option unit unit_struct
-        seq tuple tuple_struct map struct enum identifier
+        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 char str string bytes byte_buf unit unit_struct seq
+        tuple tuple_struct map identifier
     }
 }
 

@@ -19,7 +19,6 @@ use serde::de::value::MapDeserializer;
 
 use super::guarded::Guard;
 use super::limits::ParseContext;
-use super::members::object;
 use super::parse::refusal;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
@@ -79,7 +78,7 @@ pub fn parse_ply<T: DeserializeOwned>(bytes: &[u8], context: &ParseContext<'_>) 
         .into_iter()
         .filter_map(|(name, columns)| Some((name, Rows::new(cursor, vertices, columns?, &failure))));
     let guard = Guard::asking_for_any(context);
-    object(guard.around(MapDeserializer::new(members))).map_err(|error| match failure.take() {
+    T::deserialize(guard.around(MapDeserializer::new(members))).map_err(|error| match failure.take() {
         Some(failure) => malformed(failure),
         None => refusal(&error, &guard, context, b"{}"),
     })

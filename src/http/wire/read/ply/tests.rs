@@ -79,10 +79,8 @@ fn other_properties_and_elements_are_passed_over() {
     assert_eq!(read(&file("ascii", &header, text)), expected);
     for (format, is_big) in [("binary_little_endian", false), ("binary_big_endian", true)] {
         let mut data = Vec::new();
-        let mut put = |bytes: &[u8]| match is_big {
-            true => data.extend(bytes.iter().rev()),
-            false => data.extend(bytes),
-        };
+        let mut put =
+            |bytes: &[u8]| if is_big { data.extend(bytes.iter().rev()) } else { data.extend(bytes) };
         put(&[2]);
         [7_i32, 8].iter().for_each(|i| put(&i.to_le_bytes()));
         put(&35.5_f32.to_le_bytes());

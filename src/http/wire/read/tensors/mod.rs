@@ -11,7 +11,6 @@ use serde::de::DeserializeOwned;
 
 use super::guarded::Guard;
 use super::limits::ParseContext;
-use super::members::object;
 use super::parse::refusal;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
@@ -99,7 +98,7 @@ fn parse_merged<T: DeserializeOwned>(
 ) -> Result<T, Problem> {
     let guard = Guard::asking_for_any(context);
     let mut json = serde_json::Deserializer::from_str(text);
-    let parsed = object(guard.around(Merged::new(&mut json, tensors)));
+    let parsed = T::deserialize(guard.around(Merged::new(&mut json, tensors)));
     let parsed = parsed.and_then(|request| json.end().map(|()| request));
     parsed.map_err(|error| refusal(&error, &guard, context, text.as_bytes()))
 }
@@ -113,18 +112,15 @@ mod tests {
     use serde::Deserialize;
 
     use super::*;
-    use crate::http::wire::read::members::{present, present_object, present_unless_empty};
+    use crate::http::wire::read::members::present_unless_empty;
     use crate::http::wire::read::points::Points;
 
     #[derive(Debug, Deserialize)]
     #[serde(deny_unknown_fields)]
     struct Request {
         points: Points,
-        #[serde(default, deserialize_with = "present")]
         values: Option<Vec<f64>>,
-        #[serde(default, deserialize_with = "present")]
         alpha: Option<f64>,
-        #[serde(default, deserialize_with = "present")]
         geometry: Option<Geometry>,
     }
 
@@ -132,7 +128,6 @@ mod tests {
     #[serde(deny_unknown_fields)]
     struct Geometry {
         noise: Vec<f64>,
-        #[serde(default, deserialize_with = "present")]
         alpha: Option<f64>,
     }
 
@@ -225,9 +220,7 @@ mod tests {
             normals: Option<Points>,
             #[serde(default, deserialize_with = "present_unless_empty")]
             noise_variances: Option<Vec<f64>>,
-            #[serde(default, deserialize_with = "present")]
             include: Option<Vec<String>>,
-            #[serde(default, deserialize_with = "present_object")]
             geometry: Option<Box<WithWords>>,
         }
         let parse = |tensors: &[Given<'_>], text| {

@@ -1,0 +1,37 @@
+//! Declaration of operations that compute.
+
+/// Declares the handler of an operation that computes, its name, and its entry in the `OpenAPI` document.
+///
+/// The documentation is that of the document: a line as summary, and the description. Invocations are not
+/// indented, because the document has the line breaks of the description.
+macro_rules! operation {
+    (
+        $(#[$doc:meta])*
+        pub async fn $name:ident($request:ident) -> $answer:ident;
+        path: $path:literal, tag: $tag:literal, answer: $description:literal
+    ) => {
+        $(#[$doc])*
+        #[utoipa::path(
+            post,
+            path = $path,
+            tag = $tag,
+            request_body = $request,
+            responses(
+                (status = 200, description = $description, body = $answer),
+                $crate::http::openapi::responses::ComputeProblems
+            )
+        )]
+        pub async fn $name(
+            axum::extract::State(app): axum::extract::State<std::sync::Arc<$crate::http::state::app::App>>,
+            axum::Extension(owner): axum::Extension<$crate::store::Owner>,
+            request: axum::extract::Request,
+        ) -> Result<axum::response::Response, $crate::http::problem::Problem> {
+            $crate::http::serve::operation::serve::<$request>(app, owner, request).await
+        }
+
+        impl $crate::http::serve::operation::Named for $request {
+            const NAME: &'static str = stringify!($name);
+        }
+    };
+}
+pub(crate) use operation;
