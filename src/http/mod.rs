@@ -32,6 +32,7 @@ use around::{authentication, middleware};
 use jobs::Runner;
 pub use routes::reading;
 use routes::surface::{curvatures, laplace_beltrami, normals, surface_gradient};
+use routes::tiles::{coarse, regions, sides};
 use routes::values::{interpolation, model_selection, posterior};
 use routes::{clouds, estimate, jobs as job_routes, kernels, pages, process};
 use state::app::App;
@@ -96,6 +97,9 @@ fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
         .routes(routes!(posterior::compute_posterior))
         .routes(routes!(posterior::compute_posterior_batch))
         .routes(routes!(model_selection::select_model))
+        .routes(routes!(coarse::choose_coarse_cloud))
+        .routes(routes!(regions::compute_regions))
+        .routes(routes!(sides::choose_sides))
         .routes(routes!(normals::compute_normals))
         .routes(routes!(curvatures::compute_curvatures))
         .routes(routes!(surface_gradient::compute_surface_gradient))

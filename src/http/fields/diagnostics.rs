@@ -141,11 +141,9 @@ pub struct Diagnostics {
     pub noise_deviation: Option<f64>,
     /// What local regressions learned of the cloud, or were given.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub hyperparameters: Option<Hyperparameters>,
     /// Number of positions around a point on which the answer there depends, with local regressions.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub reach: Option<usize>,
     /// Number of points that were merged into an earlier point.
     pub n_merged_duplicates: usize,

@@ -36,8 +36,8 @@ pub struct Hyperparameters {
     pub radius: f64,
     /// Least ratio of a curvature to its deviation at which the curvature counts as known. Absent if none
     /// is known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, minimum = 0.0)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.0)]
     pub least_ratio: Option<f64>,
 }
 

@@ -22,7 +22,7 @@ macro_rules! example_file {
 /// A request and its answer for each operation that answers with a body, by operation id.
 ///
 /// A test sends the requests in this order and compares the answers.
-pub const EXAMPLES: [(&str, &str); 24] = [
+pub const EXAMPLES: [(&str, &str); 27] = [
     example_file!("create_cloud"),
     example_file!("get_cloud"),
     example_file!("list_clouds"),
@@ -33,6 +33,9 @@ pub const EXAMPLES: [(&str, &str); 24] = [
     example_file!("compute_posterior"),
     example_file!("compute_posterior_batch"),
     example_file!("select_model"),
+    example_file!("choose_coarse_cloud"),
+    example_file!("compute_regions"),
+    example_file!("choose_sides"),
     example_file!("compute_normals"),
     example_file!("compute_curvatures"),
     example_file!("compute_surface_gradient"),

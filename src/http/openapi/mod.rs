@@ -40,6 +40,7 @@ use super::problem::ProblemDocument;
         (name = "values", description = "Functions through values: interpolation, regression, Gaussian processes."),
         (name = "geometry", description = "Normals and curvatures of the surface that a cloud samples."),
         (name = "operators", description = "Surface gradient and Laplace–Beltrami, applied and as matrices."),
+        (name = "tiles", description = "Clouds beyond one request, in tiles: the side of the surface that all tiles agree on."),
         (name = "jobs", description = "Long work: what was asked with `Prefer: respond-async`, how far it is, and what came of it."),
         (name = "process", description = "Health, version and pages for people; no key needed."),
     ),

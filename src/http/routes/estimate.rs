@@ -18,6 +18,7 @@ use super::surface::normals::NormalsRequest;
 use super::surface::surface_gradient::{
     SurfaceGradientMatrixRequest, SurfaceGradientRequest, SurfaceGradientSparseMatrixRequest,
 };
+use super::tiles::regions::RegionsRequest;
 use super::values::interpolation::{InterpolationBatchRequest, InterpolationRequest};
 use super::values::model_selection::ModelSelectionRequest;
 use super::values::posterior::{PosteriorBatchRequest, PosteriorRequest};
@@ -184,6 +185,7 @@ operations!(
     LaplaceBeltramiRequest,
     LaplaceBeltramiMatrixRequest,
     LaplaceBeltramiSparseMatrixRequest,
+    RegionsRequest,
 );
 
 impl EstimateResponse {

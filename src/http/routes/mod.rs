@@ -10,4 +10,5 @@ pub mod pages;
 pub mod process;
 pub mod reading;
 pub mod surface;
+pub mod tiles;
 pub mod values;

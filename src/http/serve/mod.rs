@@ -1,6 +1,7 @@
 //! The way of a request from its body to its answer, the same for every operation.
 
 mod diagnostics;
+pub mod direct;
 pub mod durable;
 
 pub mod operation;

@@ -3,14 +3,14 @@
 use super::common::{GeometryWork, geometry_request, plan_geometry};
 use crate::http::compute::JobObserver;
 use crate::http::fields::{
-    Degenerate, Diagnostics, Fit, GeometryInclude, OrientationChoice, SurfaceChoice, SurfaceUsed, request,
+    Degenerate, Diagnostics, Fit, GeometryInclude, Hyperparameters, OrientationChoice, SurfaceChoice,
+    SurfaceUsed, request,
 };
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::planner::Planner;
-use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
@@ -28,13 +28,9 @@ request! {
         pub orientation: Option<OrientationChoice>,
         /// Optional parts of the answer. Default: none.
         pub include: Option<Vec<GeometryInclude>>,
-        /// At most 192 points of the cloud, where `"solver": "local"` learns noise and shape of the surface.
-        ///
-        /// Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
-        /// the same sites and the points around them.
-        #[serde(default, deserialize_with = "present_unless_empty")]
-        #[schema(value_type = Option<Vec<Vec<f64>>>, max_items = 192)]
-        pub sites: Option<Points>,
+        /// What `"solver": "local"` uses instead of learning: the hyperparameters of an answer for a cloud that
+        /// has these points.
+        pub hyperparameters: Option<Hyperparameters>,
     }
 }
 
@@ -98,7 +94,7 @@ impl Operation for CurvaturesRequest {
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<GeometryWork>, Problem> {
-        let fit = Fit { sites: self.sites.take(), ..self.take_fit() };
+        let fit = Fit { hyperparameters: self.hyperparameters.take(), ..self.take_fit() };
         let request = geometry_request(self.surface, self.orientation, true, self.include.as_deref());
         plan_geometry(planner, fit, self.queries, request, Purpose::Curvatures, |d| d * d + 2 * d + 5)
     }

@@ -8,14 +8,15 @@ use super::operator::{
     Applied, AppliedAnswer, AppliedWork, MatrixAnswer, MatrixWork, SparseAnswer, StencilWork,
 };
 use crate::http::compute::JobObserver;
-use crate::http::fields::{Degenerate, Diagnostics, Fit, Geometry, MeanChoice, ValuesInclude, request};
+use crate::http::fields::{
+    Degenerate, Diagnostics, Fit, Geometry, Hyperparameters, MeanChoice, ValuesInclude, request,
+};
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::planner::Planner;
 use crate::http::wire::negotiation::Format;
-use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
@@ -174,13 +175,9 @@ request! {
         pub queries: Option<Points>,
         /// The surface, if it differs from that of the request.
         pub geometry: Option<Geometry>,
-        /// At most 192 points of the cloud, where `"solver": "local"` learns noise and shape of the surface.
-        ///
-        /// Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
-        /// the same sites and the points around them.
-        #[serde(default, deserialize_with = "present_unless_empty")]
-        #[schema(value_type = Option<Vec<Vec<f64>>>, max_items = 192)]
-        pub sites: Option<Points>,
+        /// What `"solver": "local"` uses instead of learning: the hyperparameters of an answer for a cloud that
+        /// has these points.
+        pub hyperparameters: Option<Hyperparameters>,
     }
 }
 
@@ -224,7 +221,7 @@ impl Operation for LaplaceBeltramiSparseMatrixRequest {
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<StencilWork>, Problem> {
-        let fit = Fit { sites: self.sites.take(), ..self.take_fit() };
+        let fit = Fit { hyperparameters: self.hyperparameters.take(), ..self.take_fit() };
         StencilWork::plan(planner, OPERATOR, fit, self.geometry, self.queries)
     }
 

@@ -3,7 +3,8 @@
 use super::common::{GeometryWork, geometry_request, plan_geometry};
 use crate::http::compute::JobObserver;
 use crate::http::fields::{
-    Degenerate, Diagnostics, Fit, GeometryInclude, OrientationChoice, SurfaceChoice, SurfaceUsed, request,
+    Degenerate, Diagnostics, Fit, GeometryInclude, Hyperparameters, OrientationChoice, SurfaceChoice,
+    SurfaceUsed, request,
 };
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
@@ -30,11 +31,13 @@ request! {
         pub include: Option<Vec<GeometryInclude>>,
         /// At most 192 points of the cloud, where `"solver": "local"` learns noise and shape of the surface.
         ///
-        /// Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
-        /// the same sites and the points around them.
+        /// Default: 96 to 191 points that the solver chooses.
         #[serde(default, deserialize_with = "present_unless_empty")]
         #[schema(value_type = Option<Vec<Vec<f64>>>, max_items = 192)]
         pub sites: Option<Points>,
+        /// What `"solver": "local"` uses instead of learning: the hyperparameters of an answer for a cloud that
+        /// has these points.
+        pub hyperparameters: Option<Hyperparameters>,
     }
 }
 
@@ -80,7 +83,8 @@ impl Operation for NormalsRequest {
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<GeometryWork>, Problem> {
-        let fit = Fit { sites: self.sites.take(), ..self.take_fit() };
+        let (sites, hyperparameters) = (self.sites.take(), self.hyperparameters.take());
+        let fit = Fit { sites, hyperparameters, ..self.take_fit() };
         let request = geometry_request(self.surface, self.orientation, false, self.include.as_deref());
         plan_geometry(planner, fit, self.queries, request, Purpose::Normals, |d| d + 3)
     }

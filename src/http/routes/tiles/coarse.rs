@@ -55,11 +55,9 @@ pub struct CoarseResponse {
 #[utoipa::path(
     post,
     path = "/v1/coarse",
-    operation_id = "choose_coarse_cloud",
     tag = "tiles",
     request_body = CoarseRequest,
-    responses((status = 200, description = "The coarse cloud", body = CoarseResponse), ComputeProblems),
-    security((), ("bearer" = []))
+    responses((status = 200, description = "The coarse cloud", body = CoarseResponse), ComputeProblems)
 )]
 pub async fn choose_coarse_cloud(
     State(app): State<Arc<App>>,
@@ -86,7 +84,8 @@ impl Direct for CoarseRequest {
             return Err(Problem::invalid_request("/count", "must be 1 or more"));
         }
         let cloud = planner.unregistered(self.points, "/points")?;
-        let refuse = |error| Problem::from_numerics(error, Pointers { points: "/points", ..Pointers::REQUEST });
+        let refuse =
+            |error| Problem::from_numerics(error, Pointers { points: "/points", ..Pointers::REQUEST });
         let coarse = Coarse::of(&cloud, self.count, noise, observer).map_err(refuse)?;
         let Coarse { points, kernel, alpha, .. } = coarse;
         Ok(CoarseResponse { points, kernel: KernelUsed::scaled(&kernel, 1.0), alpha })

@@ -74,7 +74,11 @@ impl Operation for RegionsRequest {
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<RegionsWork>, Problem> {
         let fit = Fit { hyperparameters: self.hyperparameters.take(), ..self.take_fit() };
-        let request = GeometryRequest { model: SurfaceModel::Local, ..GeometryRequest::NORMALS };
+        let request = GeometryRequest {
+            model: SurfaceModel::Local,
+            checks_curvatures: false,
+            ..GeometryRequest::CURVATURES
+        };
         let main = planner.surface_fit(fit, Purpose::Normals, &request)?;
         let (n, d) = (main.on.n_points(), main.on.stored.cloud.dimension());
         let Some(directions) = main.on.stored.normals.clone() else {
@@ -86,7 +90,12 @@ impl Operation for RegionsRequest {
         check_points(&coarse, n, "/coarse")?;
         let n_numbers = planner.check_answer(n.checked_mul(8 + 4 * d))?;
         let cost = Cost { work: regions_price(n, d), n_numbers, n_held: 2 * n };
-        Ok(Plan { main: main.into(), surface: None, work: RegionsWork { own: self.own, coarse, directions }, cost })
+        Ok(Plan {
+            main: main.into(),
+            surface: None,
+            work: RegionsWork { own: self.own, coarse, directions },
+            cost,
+        })
     }
 
     fn compute(work: RegionsWork, fits: &Fits, observer: &JobObserver) -> Result<RegionsResponse, Problem> {

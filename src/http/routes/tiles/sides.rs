@@ -58,11 +58,9 @@ pub struct SidesResponse {
 #[utoipa::path(
     post,
     path = "/v1/sides",
-    operation_id = "choose_sides",
     tag = "tiles",
     request_body = SidesRequest,
-    responses((status = 200, description = "The sides of all regions", body = SidesResponse), ComputeProblems),
-    security((), ("bearer" = []))
+    responses((status = 200, description = "The sides of all regions", body = SidesResponse), ComputeProblems)
 )]
 pub async fn choose_sides(
     State(app): State<Arc<App>>,
@@ -78,7 +76,8 @@ impl Direct for SidesRequest {
 
     fn price(&self) -> Price {
         let sizes = self.tiles.iter().map(|tile| (tile.regions.len(), tile.borders.len()));
-        let (n_regions, n_borders) = sizes.fold((0, 0), |(a, b), (regions, borders)| (a + regions, b + borders));
+        let (n_regions, n_borders) =
+            sizes.fold((0, 0), |(a, b), (regions, borders)| (a + regions, b + borders));
         tiles::sides_price(n_regions, n_borders + self.links.len())
     }
 

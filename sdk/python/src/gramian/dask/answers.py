@@ -1,13 +1,18 @@
 """Answers of tiles: Dask arrays in the order of the points, or of the queries.
 
-n is the number of points of the cloud, d their dimension, m the number of queries; L is the unit of the coordinates and
-V that of the values. Nothing is computed until Dask is asked to: `dask.compute(answer)` returns the same object with
-NumPy arrays, and computes each tile once for all of its arrays.
+n is the number of points of the cloud, d their dimension, m the number of queries. L is the unit of the coordinates
+and V that of the values. Nothing is computed until Dask is asked to: `dask.compute(answer)` returns the same object
+with NumPy arrays, and computes each tile once for all of its arrays.
+
+`reasons` says in a word why an answer is missing or doubtful, `[n]`, as in `gramian.DegenerateReason`.
+`uncertain_orientation` stands where the side of the surface is nearly a matter of chance, and nothing for all others.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, TypeVar
 
 import dask.array as da
 import numpy as np
@@ -16,23 +21,23 @@ from scipy.sparse import csr_matrix
 from ..arguments.arrays import read
 from ..wire.tensors import Array
 
+T = TypeVar("T", bound="Normals | Interpolation")
+
 
 @dataclass(frozen=True, eq=False)
 class Normals:
-    """Unit normals of the surface at the points. Deviations are None unless asked for.
+    """Unit normals of the surface at the points, NaN where there are none. Deviations are None unless asked for.
 
     Attributes
     ----------
     normals
-        `[n, d]`, of length 1, outward; NaN where there is none.
+        `[n, d]`, of length 1, outward.
     levels
         `[n]`. 1 minus the height of the point above the surface, L.
     normal_deviations
         `[n]`, radians. Standard deviation of the angle of the normal: 95 % of the angles lie within 1.96 of it.
     reasons
-        `[n]`, text: why a point has no normal or a doubtful one, as in `gramian.DegenerateReason`;
-        `uncertain_orientation` where its side is nearly a matter of chance, `other_hyperparameters` where its tile
-        learned something else than the cloud; empty for all others.
+        `[n]`, text.
     """
 
     normals: da.Array
@@ -42,55 +47,33 @@ class Normals:
 
 
 @dataclass(frozen=True, eq=False)
-class Curvatures:
-    """Curvatures of the surface at the points: with outward normals, a sphere of radius r has +1/r everywhere.
-
-    Deviations are None unless asked for. Numbers are NaN where there are none.
+class Curvatures(Normals):
+    """Normals and curvatures of the surface at the points. With outward normals a sphere of radius r has +1/r.
 
     Attributes
     ----------
     principal_curvatures
-        `[n, d − 1]`, 1/L, ascending.
-    principal_directions
-        `[n, d − 1, d]`, of length 1.
+        `[n, d − 1]`, 1/L, ascending. `principal_directions`, `[n, d − 1, d]`, are theirs, of length 1.
     mean_curvatures
         `[n]`, 1/L. The average of the principal curvatures.
     gaussian_curvatures
         `[n]`, 1/L^(d − 1). Their product.
-    normals
-        `[n, d]`, of length 1, outward.
-    levels
-        `[n]`. 1 minus the height of the point above the surface, L.
-    normal_deviations
-        `[n]`, radians. Standard deviation of the angle of the normal.
-    principal_curvature_deviations
-        `[n, d − 1]`, 1/L. Standard deviations of the principal curvatures.
-    mean_curvature_deviations
-        `[n]`, 1/L.
-    gaussian_curvature_deviations
-        `[n]`, 1/L^(d − 1).
-    reasons
-        `[n]`, text: why a point has no curvatures or doubtful ones, as in `gramian.DegenerateReason`;
-        `uncertain_orientation` where its side is nearly a matter of chance, `other_hyperparameters` where its tile
-        learned something else than the cloud; empty for all others.
+    principal_curvature_deviations, mean_curvature_deviations, gaussian_curvature_deviations
+        Standard deviations of these, in the same shapes.
     """
 
     principal_curvatures: da.Array
     principal_directions: da.Array
     mean_curvatures: da.Array
     gaussian_curvatures: da.Array
-    normals: da.Array
-    levels: da.Array
-    normal_deviations: da.Array | None
     principal_curvature_deviations: da.Array | None
     mean_curvature_deviations: da.Array | None
     gaussian_curvature_deviations: da.Array | None
-    reasons: da.Array
 
 
 @dataclass(frozen=True, eq=False)
 class Interpolation:
-    """A function u through the values, kriged at each query from the points nearest to it; None is what was not asked.
+    """A function u through the values, kriged at each query from the points nearest to it. None is what was not asked.
 
     Attributes
     ----------
@@ -123,8 +106,7 @@ class SparseOperator:
         `[n, n]`, a Dask array whose blocks are rows as `scipy.sparse.csr_matrix`; `compute()` makes one matrix of them.
         Rows have no entries where there is no value.
     reasons
-        `[n]`, text: why a row is empty or doubtful, as in `gramian.DegenerateReason`, or `other_hyperparameters`
-        where its tile learned something else than the cloud; "" for all others.
+        `[n]`, text.
     """
 
     matrices: tuple[da.Array, ...]
@@ -141,6 +123,11 @@ class SparseOperator:
             da.map_blocks(_product, matrix, whole, drop_axis=1, dtype=float, meta=np.empty(0))
             for matrix in self.matrices
         )
+
+
+def named(kind: type[T], found: Mapping[str, Any]) -> T:
+    """Makes an answer of its arrays by name. Those that are absent are None."""
+    return kind(**{field.name: found.get(field.name) for field in fields(kind)})
 
 
 def _product(rows: csr_matrix, values: Array) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import dask.array as da
 import numpy as np
 
 from ..answers import Interpolation
@@ -13,12 +14,18 @@ from ..client import Client
 from ..rest.models import KernelUsed
 from ..rest.types import Unset
 from ..wire.tensors import Array
+from .asking import choose_coarse
 from .cells.parts import Part, Reach, join
+from .cells.plan import Plan, nearest_to
 from .replicas import Replicas
 from .requests import Rows
 
 NEIGHBOURS = 128
-"""Points that the service kriges each query from."""
+"""Number of points from which the service kriges each query."""
+
+N_CENTRES = 16
+TOGETHER = 16
+"""Groups of points, and points of each, from whose values a kernel is learned."""
 
 
 @dataclass(frozen=True)
@@ -37,85 +44,103 @@ class Law:
     alpha: float
     mean: Array
 
+    @classmethod
+    def of(cls, replicas: Replicas, plan: Plan, arrays: tuple[da.Array, da.Array], fit: ValuesFit) -> Law:
+        """Takes what is given, and learns the rest now, from at most 256 of the points and values."""
+        if given := cls.given(fit):
+            return given
+        points, all_values = arrays
+
+        def centres(client: Client) -> Array:
+            return plan.sample.points[choose_coarse(client, plan.sample.points, count=N_CENTRES)[0]]
+
+        near = nearest_to(replicas.ask(0, centres), points, Reach(TOGETHER, are_distinct=False))
+        values = all_values[near.index].compute()
+
+        def call(client: Client) -> Law:
+            used = client.cloud(near.points).posterior(values, near.points[:1], **fit).diagnostics
+            mean = [] if isinstance(used.mean_coefficients, Unset) else used.mean_coefficients
+            return cls(used.kernel, float(used.alpha or 0), np.array(mean, dtype=np.float64))
+
+        return replicas.ask(0, call)
+
+    @classmethod
+    def given(cls, fit: ValuesFit) -> Law | None:
+        """Returns what is given if nothing is left to ask for: a length scale, alpha, and no mean."""
+        kernel, alpha = fit.get("kernel"), fit.get("alpha")
+        if isinstance(kernel, Mapping):
+            kernel = Kernel(**kernel)
+        if not isinstance(kernel, Kernel | KernelUsed) or alpha is None or isinstance(alpha, Unset):
+            return None
+        scales = [kernel.length_scale, kernel.length_scales]
+        if fit.get("mean") not in (None, "zero") or all(scale is None or isinstance(scale, Unset) for scale in scales):
+            return None
+        return cls(kernel, float(alpha), np.empty(0))
+
     def mean_at(self, points: Array) -> Array:
         """Returns the mean at points, `[n]`."""
         if len(self.mean) == 0:
             return np.zeros(len(points))
-        slopes = self.mean[1:]
-        at_points: Array = self.mean[0] + (points @ slopes if len(slopes) else np.zeros(len(points)))
+        at_points: Array = self.mean[0] + (points @ self.mean[1:] if len(self.mean) > 1 else np.zeros(len(points)))
         return at_points
 
-
-def given_law(fit: ValuesFit) -> Law | None:
-    """Returns what is given, if that is a length scale, α and no mean: then nothing is left to ask for."""
-    kernel, alpha = fit.get("kernel"), fit.get("alpha")
-    if isinstance(kernel, Mapping):
-        kernel = Kernel(**kernel)
-    if not isinstance(kernel, Kernel | KernelUsed) or alpha is None or isinstance(alpha, Unset):
-        return None
-    scales = [kernel.length_scale, kernel.length_scales]
-    if fit.get("mean") not in (None, "zero") or all(scale is None or isinstance(scale, Unset) for scale in scales):
-        return None
-    return Law(kernel, float(alpha), np.empty(0))
+    @property
+    def reach(self) -> Reach:
+        """Which points kriging looks at: the nearest ones as a kernel with a length scale for each axis measures."""
+        scales = self.kernel.length_scales
+        stretch = None if scales is None or isinstance(scales, Unset) else tuple(min(scales) / scale for scale in scales)
+        return Reach(NEIGHBOURS, are_distinct=False, stretch=stretch)
 
 
-def learn_law(replicas: Replicas, sample: Part, fit: ValuesFit) -> Law:
-    """Asks for what is not given, from at most 256 values; they are those that the service would look at."""
-    values = np.asarray(sample.values)
+@dataclass(frozen=True)
+class Kriging:
+    """What is asked of every tile.
 
-    def call(client: Client) -> Law:
-        answer = client.cloud(sample.points).posterior(values, sample.points[:1], **fit)
-        used = answer.diagnostics
-        mean = [] if isinstance(used.mean_coefficients, Unset) else used.mean_coefficients
-        return Law(used.kernel, float(used.alpha or 0), np.array(mean, dtype=np.float64))
+    Attributes
+    ----------
+    law
+        The process of the values.
+    derivatives
+        0, 1 or 2.
+    deviations
+        Whether standard deviations are wanted.
+    """
 
-    return replicas.ask(0, call)
+    law: Law
+    derivatives: int
+    deviations: bool
 
+    def kinds(self, dimension: int) -> dict[str, Array]:
+        """Returns empty arrays of the shapes of the answers, by name."""
+        shapes = {"values": (), "gradients": (dimension,), "hessians": (dimension, dimension)}
+        names = list(shapes)[: self.derivatives + 1]
+        kinds = {name: np.empty((0, *shapes[name])) for name in names}
+        if self.deviations:
+            kinds |= {f"{name[:-1]}_deviations": np.empty((0, *shapes[name])) for name in names}
+        return kinds
 
-def stretch_of(kernel: Kernel | KernelUsed) -> tuple[float, ...] | None:
-    """Returns the factors by which a kernel with a length scale for each axis measures coordinates."""
-    scales = kernel.length_scales
-    if scales is None or isinstance(scales, Unset):
-        return None
-    return tuple(min(scales) / scale for scale in scales)
+    def krige(self, replicas: Replicas, number: int, core: Part, rims: Sequence[Part], queries: Part) -> Rows:
+        """Asks for the function at the queries of a cell, from the points of the cell and its rims."""
+        if len(queries) == 0:
+            return {}
+        tile, law = join([core, *rims]), self.law
+        left = np.asarray(tile.values) - law.mean_at(tile.points)
 
+        def call(client: Client) -> Interpolation:
+            return client.cloud(tile.points).interpolate(
+                left,
+                queries.points,
+                derivatives=self.derivatives,
+                deviations=self.deviations,
+                kernel=law.kernel,
+                alpha=law.alpha,
+                mean="zero",
+                solver="local",
+            )
 
-def krige(
-    replicas: Replicas,
-    number: int,
-    core: Part,
-    rims: Sequence[Part],
-    queries: Part,
-    law: Law,
-    derivatives: int,
-    deviations: bool,
-) -> Rows:
-    """Asks for the function at the queries of a cell, from the points of the cell and its rims."""
-    if len(queries) == 0:
-        return {}
-    tile = join([core, *rims])
-    left = np.asarray(tile.values) - law.mean_at(tile.points)
-
-    def call(client: Client) -> Interpolation:
-        return client.cloud(tile.points).interpolate(
-            left,
-            queries.points,
-            derivatives=derivatives,
-            deviations=deviations,
-            kernel=law.kernel,
-            alpha=law.alpha,
-            mean="zero",
-            solver="local",
-        )
-
-    answer = replicas.ask(number, call)
-    rows: Rows = {name: array for name, array in vars(answer).items() if isinstance(array, np.ndarray)}
-    rows["values"] = answer.values + law.mean_at(queries.points)
-    if answer.gradients is not None and len(law.mean) > 1:
-        rows["gradients"] = answer.gradients + law.mean[1:]
-    return rows | {"index": queries.index}
-
-
-def reach_of(kernel: Kernel | KernelUsed) -> Reach:
-    """Returns which points a kernel's kriging looks at."""
-    return Reach(NEIGHBOURS, are_distinct=False, stretch=stretch_of(kernel))
+        answer = replicas.ask(number, call)
+        rows: Rows = {name: array for name, array in vars(answer).items() if isinstance(array, np.ndarray)}
+        rows["values"] = answer.values + law.mean_at(queries.points)
+        if answer.gradients is not None and len(law.mean) > 1:
+            rows["gradients"] = answer.gradients + law.mean[1:]
+        return rows | {"index": queries.index}

@@ -1,8 +1,8 @@
-"""What is asked of a replica for a tile. All of it runs in tasks of Dask, and may be repeated."""
+"""What is asked of a replica about the surface of a tile. It runs in tasks of Dask, and may be repeated."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -14,75 +14,68 @@ from ..client import Client
 from ..rest.models import Degenerate
 from ..wire.tensors import Array
 from .cells.cut import Ints
-from .orientation.signs import Sides
 from .replicas import Replicas
-from .settling import Settled
+from .surface import Sides, SurfaceTile, Whole
 
 Rows: TypeAlias = dict[str, Any]
-"""Arrays by name with a row for each of `index`, the rows of a cloud or of queries, ascending."""
+"""Arrays by name, with a row for each of `index`, the rows of a cloud or of queries, ascending."""
 
 REASON = "U24"
 
-OTHER_HYPERPARAMETERS = "other_hyperparameters"
-"""The tile learned something else than the cloud."""
-
 UNCERTAIN_ORIENTATION = "uncertain_orientation"
-"""What says which side of a connected piece is outward says little."""
+"""The side of a connected piece is nearly a matter of chance."""
+
+NOT_PER_POINT = ("surfaces", "gradient_norms", "degenerate", "diagnostics", "fit")
+"""Members of answers that tiles do not have."""
 
 
-def surface(replicas: Replicas, settled: Settled, sides: Sides, what: str, deviations: bool) -> Rows:
-    """Asks for normals or curvatures at the points of a cell; `sides` are those of its regions."""
-    tile = settled.tile
+def surface(replicas: Replicas, tile: SurfaceTile, sides: Sides, whole: Whole, what: str, deviations: bool) -> Rows:
+    """Asks for normals or curvatures at the points of a cell. `sides` are those of the regions of its tile."""
     if len(tile.own) == 0:
         return {}
 
     def call(client: Client) -> Normals | Curvatures:
-        cloud = settled.cloud(client)
+        cloud = tile.cloud(client)
         ask = cloud.normals if what == "normals" else cloud.curvatures
-        return ask(solver="local", deviations=deviations, sites=settled.sites)
+        return ask(solver="local", deviations=deviations, hyperparameters=whole.hyperparameters)
 
     answer = replicas.ask(tile.number, call)
-    reasons = _reasons(answer.degenerate, settled)
-    reasons[(reasons == "") & sides.are_doubtful[settled.labels[tile.own]]] = UNCERTAIN_ORIENTATION
-    turned = _turned(_arrays(answer), sides.signs[settled.labels], answer.normals.shape[1], tile.own)
-    return {"index": tile.rows, "reasons": reasons, **turned}
+    labels = tile.labels[tile.own]
+    reasons = _reasons(answer.degenerate, tile)
+    reasons[(reasons == "") & sides.are_doubtful[labels]] = UNCERTAIN_ORIENTATION
+    arrays = {name: array for name, array in vars(answer).items() if name not in NOT_PER_POINT and array is not None}
+    return {"index": tile.rows, "reasons": reasons, **_turned(arrays, tile.own, sides.signs[labels])}
 
 
-def operator(replicas: Replicas, settled: Settled, what: str, n_points: int) -> Rows:
+def operator(replicas: Replicas, tile: SurfaceTile, whole: Whole, what: str, n_points: int) -> Rows:
     """Asks for the rows of an operator at the points of a cell, with the points of the cloud as columns."""
-    tile = settled.tile
     if len(tile.own) == 0:
         return {}
 
-    def call(client: Client) -> tuple[list[csr_matrix], tuple[Degenerate, ...]]:
-        cloud = settled.cloud(client)
+    def call(client: Client) -> tuple[Sequence[csr_matrix], tuple[Degenerate, ...]]:
+        cloud, known = tile.cloud(client), whole.hyperparameters
         if what == "laplace_beltrami":
-            of_values = cloud.laplace_beltrami_sparse_matrix(solver="local", sites=settled.sites)
+            of_values = cloud.laplace_beltrami_sparse_matrix(solver="local", hyperparameters=known)
             return [of_values.matrix], of_values.degenerate
-        of_gradients = cloud.surface_gradient_sparse_matrix(solver="local", sites=settled.sites)
-        return list(of_gradients.matrices), of_gradients.degenerate
+        of_gradients = cloud.surface_gradient_sparse_matrix(solver="local", hyperparameters=known)
+        return of_gradients.matrices, of_gradients.degenerate
 
     matrices, degenerate = replicas.ask(tile.number, call)
-    rows: Rows = {"index": tile.rows, "reasons": _reasons(degenerate, settled)}
+    rows: Rows = {"index": tile.rows, "reasons": _reasons(degenerate, tile)}
     for component, matrix in enumerate(matrices):
         own = matrix[tile.own]
-        entries = (own.data, tile.index[own.indices], own.indptr)
-        whole = csr_matrix(entries, shape=(len(tile.own), n_points))
-        whole.sort_indices()
-        rows[f"matrix {component}"] = whole
+        entries = (own.data, tile.part.index[own.indices], own.indptr)
+        whole_rows = csr_matrix(entries, shape=(len(tile.own), n_points))
+        whole_rows.sort_indices()
+        rows[f"matrix {component}"] = whole_rows
     return rows
 
 
-def _arrays(answer: Normals | Curvatures) -> dict[str, Array]:
-    """Returns what an answer has for each query, by name."""
-    left_out = ("surfaces", "gradient_norms", "degenerate", "diagnostics", "fit")
-    return {name: array for name, array in vars(answer).items() if name not in left_out and array is not None}
-
-
-def _turned(arrays: Mapping[str, Array], signs: Array, dimension: int, rows: Ints) -> dict[str, Array]:
+def _turned(arrays: Mapping[str, Array], rows: Ints, signs: Array) -> dict[str, Array]:
     """Returns these rows of the arrays of an answer for normals with these signs."""
-    turned = signs[rows] < 0
+    turned = signs < 0
     found = {name: array[rows] for name, array in arrays.items()}
+    dimension = found["normals"].shape[1]
     for name, array in found.items():
         if name.startswith("principal"):
             array[turned] = array[turned][:, ::-1]
@@ -95,10 +88,8 @@ def _turned(arrays: Mapping[str, Array], signs: Array, dimension: int, rows: Int
     return found
 
 
-def _reasons(degenerate: tuple[Degenerate, ...], settled: Settled) -> npt.NDArray[np.str_]:
-    """Returns why answers at the points of the cell are doubtful; what the service says of one comes first."""
-    reasons = np.zeros(len(settled.tile.points), dtype=REASON)
+def _reasons(degenerate: tuple[Degenerate, ...], tile: SurfaceTile) -> npt.NDArray[np.str_]:
+    """Returns why answers at the points of the cell are doubtful."""
+    reasons = np.zeros(len(tile.part), dtype=REASON)
     reasons[[entry.query for entry in degenerate]] = [entry.reason.value for entry in degenerate]
-    if not settled.is_alike:
-        reasons[reasons == ""] = OTHER_HYPERPARAMETERS
-    return reasons[settled.tile.own]
+    return reasons[tile.own]

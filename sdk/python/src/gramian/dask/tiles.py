@@ -11,12 +11,13 @@ from scipy.sparse import csr_matrix
 from ..arguments.fit import KernelLike, Mean, Number, ValuesFit
 from ..arguments.keywords import suggest_names
 from ..wire.tensors import Array
-from . import answers, kriging, requests
-from .cells import graph, parts
+from . import answers, requests
+from .cells import graph
 from .cells.plan import Plan
 from .gathering import gathered
+from .kriging import Kriging, Law
 from .replicas import Replicas
-from .sampled import SurfaceTiles
+from .surface import SurfaceTiles
 
 NO_REASONS = np.empty(0, dtype=requests.REASON)
 
@@ -37,7 +38,7 @@ class Tiles:
     Attributes
     ----------
     plan
-        What tiles have in common: cells, coarse cloud, samples.
+        What tiles have in common: the cells, and samples of the cloud.
     """
 
     def __init__(self, replicas: Replicas, points: da.Array, n_tiles: int) -> None:
@@ -67,13 +68,11 @@ class Tiles:
 
     def normals(self, *, deviations: bool = False) -> answers.Normals:
         """Computes unit normals at the points, outward as the coarse cloud has it, with `deviations` if asked for."""
-        found = self._of_surface("normals", deviations)
-        return answers.Normals(**{name: found.get(name) for name in answers.Normals.__dataclass_fields__})
+        return answers.named(answers.Normals, self._of_surface("normals", deviations))
 
     def curvatures(self, *, deviations: bool = False) -> answers.Curvatures:
         """Computes curvatures at the points, with `deviations` if asked for; a sphere of radius r has +1/r."""
-        found = self._of_surface("curvatures", deviations)
-        return answers.Curvatures(**{name: found.get(name) for name in answers.Curvatures.__dataclass_fields__})
+        return answers.named(answers.Curvatures, self._of_surface("curvatures", deviations))
 
     def laplace_beltrami(self) -> answers.SparseOperator:
         """Assembles the sparse Laplace–Beltrami operator on values at the points, 1/L²."""
@@ -119,43 +118,29 @@ class Tiles:
         """
         own = graph.aligned(values, self._points)
         fit = ValuesFit(solver="dense", kernel=kernel, alpha=alpha, mean=mean)
-        law = kriging.given_law(fit) or self._law(own, fit)
+        law = Law.of(self._replicas, self.plan, (self._points, own), fit)
         cores = graph.cores(self._points, self.plan, own)
         asked = self._points if queries is None else graph.rows_of(queries, "queries", self.plan.dimension)
         wanted = cores if queries is None else graph.cores(asked, self.plan)
-        rims = graph.rims(cores, self.plan, kriging.reach_of(law.kernel), wanted)
-        krige = dask.delayed(kriging.krige, pure=True)
+        rims = graph.rims(cores, self.plan, law.reach, wanted)
+        kriging, krige = Kriging(law, derivatives, deviations), dask.delayed(Kriging.krige, pure=True)
         asks = [
-            krige(self._replicas, cell, cores[cell], rims[cell], wanted[cell], law, derivatives, deviations)
-            for cell in range(self.n_tiles)
+            krige(kriging, self._replicas, cell, cores[cell], rims[cell], wanted[cell]) for cell in range(self.n_tiles)
         ]
-        d = self.plan.dimension
-        shapes = {"values": (), "gradients": (d,), "hessians": (d, d)}
-        names = list(shapes)[: derivatives + 1]
-        kinds = {name: np.empty((0, *shapes[name])) for name in names}
-        if deviations:
-            kinds |= {f"{name[:-1]}_deviations": np.empty((0, *shapes[name])) for name in names}
-        found = gathered(asks, asked.chunks[0], kinds)
-        return answers.Interpolation(**{name: found.get(name) for name in answers.Interpolation.__dataclass_fields__})
-
-    def _law(self, values: da.Array, fit: ValuesFit) -> kriging.Law:
-        rows = self.plan.learning.index
-        sample = parts.Part(rows, self.plan.learning.points, values[rows].compute())
-        law: kriging.Law = dask.delayed(kriging.learn_law)(self._replicas, sample, fit).compute()
-        return law
+        found = gathered(asks, asked.chunks[0], kriging.kinds(self.plan.dimension))
+        return answers.named(answers.Interpolation, found)
 
     def _of_surface(self, what: str, deviations: bool) -> dict[str, da.Array]:
         surface, ask = self._in_tiles(), dask.delayed(requests.surface, pure=True)
         pairs = zip(surface.tiles, surface.sides, strict=True)
-        rows = [ask(self._replicas, tile, sides, what, deviations) for tile, sides in pairs]
+        rows = [ask(self._replicas, tile, sides, surface.whole, what, deviations) for tile, sides in pairs]
         d = self.plan.dimension
         shapes: dict[str, tuple[int, ...]] = {"normals": (d,), "levels": ()}
         known: dict[str, tuple[int, ...]] = {"normal": ()}
         if what == "curvatures":
             known |= {"principal_curvature": (d - 1,), "mean_curvature": (), "gaussian_curvature": ()}
             shapes |= {f"{name}s": shape for name, shape in known.items()}
-            shapes["principal_directions"] = (d - 1, d)
-            shapes["normals"] = (d,)
+            shapes |= {"principal_directions": (d - 1, d), "normals": (d,)}
         if deviations:
             shapes |= {f"{name}_deviations": shape for name, shape in known.items()}
         kinds = {name: np.empty((0, *shape)) for name, shape in shapes.items()}
@@ -165,8 +150,8 @@ class Tiles:
         n = self.plan.n_points
         names = [f"matrix {component}" for component in range(n_components)]
         kinds = {"reasons": NO_REASONS, **{name: csr_matrix((0, n)) for name in names}}
-        ask = dask.delayed(requests.operator, pure=True)
-        rows = [ask(self._replicas, tile, what, n) for tile in self._in_tiles().tiles]
+        surface, ask = self._in_tiles(), dask.delayed(requests.operator, pure=True)
+        rows = [ask(self._replicas, tile, surface.whole, what, n) for tile in surface.tiles]
         found = gathered(rows, self._points.chunks[0], kinds)
         return answers.SparseOperator(tuple(found[name] for name in names), found["reasons"])
 

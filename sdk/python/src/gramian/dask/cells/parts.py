@@ -11,7 +11,6 @@ from scipy.spatial import cKDTree
 
 from ...wire.tensors import Array
 from .cut import Cut, Ints
-from .thinning import distinct
 
 SLACK = 1 + 1e-9
 """By how much more is taken than distances say, which are rounded."""
@@ -84,6 +83,16 @@ class Reach:
     def candidates(self, part: Part) -> Part:
         """Returns the points that count."""
         return part[distinct(part.points)] if self.are_distinct else part
+
+
+def distinct(points: Array) -> Ints:
+    """Returns the places of the first point of each position, ascending."""
+    if len(points) == 0:
+        return np.arange(0)
+    order = np.lexsort((np.arange(len(points)), *points.T))
+    is_first = np.ones(len(points), dtype=bool)
+    is_first[1:] = (points[order[1:]] != points[order[:-1]]).any(axis=1)
+    return np.sort(order[is_first])
 
 
 def split(block: Array, first: int, cut: Cut, values: Array | None = None) -> list[Part]:
