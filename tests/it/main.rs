@@ -51,6 +51,7 @@ mod settings;
 mod spans;
 mod support;
 mod surfaces;
+mod tiles;
 mod tls;
 mod unsolvable;
 mod values;

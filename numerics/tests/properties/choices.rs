@@ -9,6 +9,7 @@ use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::selection::{Learned, Noise, Observed, learn};
 use gramian_numerics::solver::trend::Mean;
+use gramian_numerics::surface::local::{Given, Learning, LocalSurface};
 
 use crate::common::random::Random;
 use crate::support::rotation;
@@ -84,6 +85,39 @@ fn parts_with_the_same_sites_learn_the_same() {
     assert!(of_whole.kernel().length_scale > 0.1);
     assert!((of_whole.kernel().length_scale / of_part.kernel().length_scale - 1.0).abs() < 1e-12);
     assert_eq!(of_whole.noise(), of_part.noise());
+}
+
+#[test]
+fn parts_with_the_hyperparameters_of_the_whole_have_its_surface() {
+    let mut random = Random(8);
+    // Noise of a thousandth of the radius, an eighth of the spacing's height over a tangent plane.
+    let on_sphere = (0..4000).flat_map(|_| {
+        let length = 1.0 + 1e-3 * random.normal();
+        random.on_sphere().map(|c| c * length)
+    });
+    let whole = Arc::new(Cloud::new(on_sphere.collect(), 3).unwrap());
+    let above = |least: f64| {
+        let points = whole.points().filter(|x| x[2] > least);
+        Arc::new(Cloud::new(points.flatten().copied().collect(), 3).unwrap())
+    };
+    let surface = |cloud: &Arc<Cloud>, learning: Option<&Learning>| {
+        let sampling = Arc::new(Sampling::of(cloud, &Unobserved).unwrap());
+        let given = Given { normals: None, learning };
+        LocalSurface::of(cloud.clone(), sampling, given, &Unobserved).unwrap()
+    };
+    let of_whole = surface(&whole, None);
+    let known = of_whole.hyperparameters();
+    assert!(known.regression.noise > 5e-4 && !known.regression.flat_noise_ratios.is_empty(), "{known:?}");
+    let of_part = surface(&above(0.0), Some(&Learning::Known(Arc::new(known.clone()))));
+    assert_eq!(of_part.hyperparameters(), known);
+    let queries = above(0.7);
+    let at_queries =
+        |surface: &LocalSurface| surface.patches().at(&queries, true, true, &Unobserved).unwrap();
+    let (a, b) = (at_queries(&of_whole), at_queries(&of_part));
+    // Normals have either sign. Neighbours are the same, so what differs is the order of sums.
+    let is_close = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(x, y)| (x.abs() - y.abs()).abs() < 1e-9);
+    assert!(is_close(&a.normals, &b.normals) && is_close(&a.normal_deviations, &b.normal_deviations));
+    assert!(is_close(&a.shapes, &b.shapes));
 }
 
 fn learned(cloud: &Cloud, values: &[f64]) -> Learned {

@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import dask
@@ -19,10 +20,10 @@ from scipy.sparse import csr_matrix
 import gramian
 import gramian.dask
 from gramian.dask.cells.cut import Cut
-from gramian.dask.cells.parts import Part, Reach, join, look, rim, split
-from gramian.dask.cells.thinning import distinct, thinned
+from gramian.dask.asking import choose_coarse
+from gramian.dask.cells.parts import Reach, distinct, join, look, rim, split
 from gramian.dask.replicas import Replicas
-from gramian.dask.tile import assemble
+from gramian.dask.surface import probe
 from gramian.wire.tensors import Array
 
 NOWHERE = "http://127.0.0.1:9"
@@ -88,11 +89,13 @@ def test_surfaces_are_those_of_one_request(
         tiles.normals(), tiles.curvatures(deviations=True), tiles.laplace_beltrami(), tiles.surface_gradient()
     )
     cloud = client.cloud(points)
-    assert_same(normals, cloud.normals(solver="local", sites=tiles.sites))
-    assert_same(curvatures, cloud.curvatures(solver="local", deviations=True, sites=tiles.sites))
+    assert_same(normals, cloud.normals(solver="local", hyperparameters=tiles.hyperparameters))
+    assert_same(curvatures, cloud.curvatures(solver="local", deviations=True, hyperparameters=tiles.hyperparameters))
     assert curvatures.mean_curvature_deviations.shape == (6000,)
-    of_all = [cloud.laplace_beltrami_sparse_matrix(solver="local", sites=tiles.sites).matrix]
-    of_all += cloud.surface_gradient_sparse_matrix(solver="local", sites=tiles.sites).matrices
+    learned = cloud.normals(points[:1], solver="local", sites=tiles.plan.sites.points).diagnostics
+    assert learned.hyperparameters == tiles.hyperparameters
+    of_all = [cloud.laplace_beltrami_sparse_matrix(solver="local", hyperparameters=tiles.hyperparameters).matrix]
+    of_all += cloud.surface_gradient_sparse_matrix(solver="local", hyperparameters=tiles.hyperparameters).matrices
     for matrix, expected in zip([*laplace.matrices, *gradient.matrices], of_all, strict=True):
         assert isinstance(matrix, csr_matrix)
         assert np.array_equal(matrix.indices, expected.indices)
@@ -114,7 +117,7 @@ def test_points_may_coincide_and_be_few(client: gramian.Client, service: gramian
     points = np.concatenate([points, points[:40]])
     tiles = service.tiles(points, n_tiles)
     (found,) = dask.compute(tiles.curvatures(deviations=True))
-    assert_same(found, client.cloud(points).curvatures(solver="local", deviations=True, sites=tiles.sites))
+    assert_same(found, client.cloud(points).curvatures(solver="local", deviations=True, hyperparameters=tiles.hyperparameters))
 
 
 def test_tiles_without_a_surface_have_no_normals(service: gramian.dask.Service) -> None:
@@ -172,7 +175,7 @@ def test_tiles_are_tasks_of_a_cluster(client: gramian.Client, points: Array) -> 
     ):
         tiles = gramian.dask.connect(urls).tiles(points, n_tiles=4)
         (normals,) = dask.compute(tiles.normals(), retries=2)
-    assert_same(normals, client.cloud(points).normals(solver="local", sites=tiles.sites))
+    assert_same(normals, client.cloud(points).normals(solver="local", hyperparameters=tiles.hyperparameters))
 
 
 def test_a_replica_may_die(another: tuple[str, subprocess.Popen[str]], client: gramian.Client, points: Array) -> None:
@@ -182,7 +185,7 @@ def test_a_replica_may_die(another: tuple[str, subprocess.Popen[str]], client: g
     process.kill()
     process.wait()
     (found,) = dask.compute(normals)
-    assert_same(found, client.cloud(points).normals(solver="local", sites=tiles.sites))
+    assert_same(found, client.cloud(points).normals(solver="local", hyperparameters=tiles.hyperparameters))
 
 
 def test_replicas_are_asked_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -236,23 +239,38 @@ def test_cells_have_equally_many_points(n: int, n_cells: int) -> None:
         assert (cut.depths(cell, points[cut.cells_of(points) == cell]) >= 0).all()
 
 
-def test_tiles_know_what_is_theirs_what_is_near_and_what_all_carry() -> None:
-    points = np.random.default_rng(0).normal(size=(5000, 3))
-    whole = Part(np.arange(5000), points)
-    core, carried = whole[np.arange(700, 1333)], whole[np.arange(0, 5000, 52)]
-    tile = assemble(0, core, [whole[np.arange(1333, 1400)]], carried)
-    assert set(carried.index) <= set(tile.index)
-    np.testing.assert_array_equal(tile.points, points[tile.index])
-    assert tile.rows.tolist() == list(range(700, 1333))
-    assert set(tile.index[tile.is_near]) == set(range(700, 1400))
+def test_large_clouds_learn_what_they_would_as_a_whole(
+    client: gramian.Client, service: gramian.dask.Service, points: Array, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gramian.dask.surface.PROBE_POINTS", 4000)
+    tiles = service.tiles(points, n_tiles=2)
+    cloud = client.cloud(points)
+    learned = cloud.normals(points[:1], solver="local", sites=tiles.plan.sites.points).diagnostics.hyperparameters
+    for name in ("length_scale", "variance", "noise_deviation", "radius"):  # up to the order of sums
+        np.testing.assert_allclose(getattr(tiles.hyperparameters, name), getattr(learned, name), rtol=1e-9, err_msg=name)
+    assert len(probe(tiles.plan, tiles._points)) == 3000
 
 
-def test_thinned_clouds_are_spread() -> None:
-    points = np.random.default_rng(0).uniform(size=(4096, 2))
-    for count in (1, 7, 64, 4095, 5000):
-        assert len(set(thinned(points, count))) == min(count, 4096)
-    quarters = (points[thinned(points, 64)] > 0.5) @ [1, 2]
-    np.testing.assert_allclose(np.bincount(quarters), 16, atol=2)
+def grains(n_of_each: int, per_axis: int) -> tuple[Array, Array]:
+    """Returns points of small spheres on a grid, in random order, and their normals."""
+    random = np.random.default_rng(7)
+    centres = np.stack(np.meshgrid(*[np.arange(per_axis)] * 3), axis=-1).reshape(-1, 3)
+    outward = random.normal(size=(len(centres) * n_of_each, 3))
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    order = random.permutation(len(outward))
+    return (np.repeat(centres, n_of_each, axis=0) + 0.25 * outward)[order], outward[order]
+
+
+def test_small_pieces_have_the_side_of_their_volume(
+    service: gramian.dask.Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    points, outward = grains(90, per_axis=4)
+    few = partial(choose_coarse, count=192)  # three points of each
+    monkeypatch.setattr("gramian.dask.surface.choose_coarse", few)
+    (found,) = dask.compute(service.tiles(points, n_tiles=3).normals())
+    cosines = (found.normals * outward).sum(axis=1)
+    assert np.count_nonzero(cosines < 0) == 0
+    assert "uncertain_orientation" not in found.reasons
 
 
 @pytest.mark.parametrize(

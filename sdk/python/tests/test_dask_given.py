@@ -15,7 +15,6 @@ import gramian.dask
 from gramian.dask import replicas
 from gramian.dask.cells import parts, plan
 from gramian.dask.cells.parts import Part, Reach, nearest
-from gramian.dask.requests import OTHER_HYPERPARAMETERS
 from gramian.wire.tensors import Array
 
 
@@ -117,15 +116,6 @@ def test_large_clouds_are_sampled_on_both_sides_of_what_alternates(monkeypatch: 
     assert (rows // 2 == np.arange(1000)).all()
     assert 400 < np.count_nonzero(rows % 2) < 600
     np.testing.assert_array_equal(rows, plan.sampled(1999))
-
-
-def test_a_tile_that_learns_something_else_says_so(
-    service: gramian.dask.Service, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("gramian.dask.settling.Learned.is_like", lambda *_: False)
-    answers = dask.compute(*[(tiles := service.tiles(POINTS, n_tiles=2)).normals(), tiles.laplace_beltrami()])
-    for answer in answers:
-        assert set(answer.reasons.tolist()) == {OTHER_HYPERPARAMETERS}
 
 
 def test_a_key_of_the_environment_is_in_no_task(monkeypatch: pytest.MonkeyPatch) -> None:

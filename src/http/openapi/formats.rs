@@ -3,7 +3,7 @@
 use utoipa::openapi::schema::{KnownFormat, SchemaFormat, SchemaType, Type};
 use utoipa::openapi::{Content, ContentBuilder, ObjectBuilder, RefOr};
 
-use super::{id_of, operations};
+use super::{id_of, is_direct, operations};
 use crate::http::wire::negotiation::Format;
 
 /// Returns the media types other than JSON that an operation accepts and answers with.
@@ -13,7 +13,7 @@ fn binary_formats(operation_id: &str) -> (&'static [Format], &'static [Format]) 
         "assemble_surface_gradient_matrix" | "assemble_laplace_beltrami_matrix" => {
             (&[Format::Safetensors], &[Format::Safetensors, Format::Npy])
         }
-        "estimate" => (&[Format::Safetensors], &[]),
+        direct if is_direct(direct) => (&[Format::Safetensors], &[]),
         _ => (&[Format::Safetensors], &[Format::Safetensors]),
     }
 }

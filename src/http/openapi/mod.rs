@@ -120,8 +120,13 @@ fn id_of(operation: &Operation) -> &str {
     operation.operation_id.as_deref().unwrap_or_default()
 }
 
+/// Whether an operation with this id needs no factorization.
+fn is_direct(id: &str) -> bool {
+    matches!(id, "estimate" | "choose_coarse_cloud" | "choose_sides")
+}
+
 /// Whether an operation answers from a factorization: all with a body, except registration of clouds and
-/// estimates.
+/// those that need none.
 fn is_computed(operation: &Operation) -> bool {
-    operation.request_body.is_some() && !matches!(id_of(operation), "create_cloud" | "estimate")
+    operation.request_body.is_some() && id_of(operation) != "create_cloud" && !is_direct(id_of(operation))
 }

@@ -10,7 +10,7 @@ from scipy.sparse import csr_matrix
 
 from ..arguments.fit import KernelLike, Mean, Number, ValuesFit
 from ..arguments.keywords import suggest_names
-from ..wire.tensors import Array
+from ..rest.models import Hyperparameters
 from . import answers, requests
 from .cells import graph
 from .cells.plan import Plan
@@ -30,8 +30,8 @@ class Tiles:
     (`dask.compute(answer, retries=3)`) and its dashboard. Ask for several things in one `dask.compute`, and each tile
     is cut once.
 
-    Answers are those of one request for all points with `solver="local"` and the `sites` of the tiles, up to ties of
-    distance and the sides of single points. Where the cloud has so much noise that the service regresses on means of
+    Answers are those of one request for all points with `solver="local"` and the `hyperparameters` of the tiles, up to
+    ties of distance and the sides of single points. Where the cloud has so much noise that the service regresses on means of
     points, these are means of other points, and answers differ as those of two samples do, by less than their
     deviations at most points.
 
@@ -58,9 +58,9 @@ class Tiles:
         return self.plan.cut.n_cells
 
     @property
-    def sites(self) -> Array:
-        """Where all tiles learn noise and shape of the surface, `[s, d]`, L."""
-        return self.plan.sites.points
+    def hyperparameters(self) -> Hyperparameters:
+        """What local regressions of all tiles take as learned. They are learned now, if they are not yet."""
+        return self._in_tiles().whole.hyperparameters
 
     def cells(self) -> da.Array:
         """Says in which tile each point is, `[n]`, from 0."""
