@@ -2,8 +2,7 @@
 
 use super::fitted::Fitted;
 use super::plan::words;
-use crate::http::fields::{Diagnostics, FactorizationUsed, KernelUsed, SolverUsed, Warning, WarningCode};
-use gramian_numerics::error::SolverKind;
+use crate::http::fields::{Diagnostics, FactorizationUsed, KernelUsed, Warning, WarningCode};
 use gramian_numerics::model::{Regressions, Report};
 use gramian_numerics::solver::trend::Trend;
 use gramian_numerics::solver::{Disagreement, Method, Outlier};
@@ -30,10 +29,7 @@ impl Fitted {
             dimension: cloud.dimension(),
             kernel,
             alpha,
-            solver: match plan.recipe.solver() {
-                SolverKind::Dense => SolverUsed::Dense,
-                SolverKind::Local => SolverUsed::Local,
-            },
+            solver: plan.recipe.solver().into(),
             solver_reason: plan.reason.map(|reason| words(reason).to_owned()),
             factorization: match report.method {
                 Some(Method::Cholesky) => FactorizationUsed::Cholesky,

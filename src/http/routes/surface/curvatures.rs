@@ -94,7 +94,6 @@ path: "/v1/curvatures", tag: "geometry", answer: "Curvatures at the queries"
 
 impl Operation for CurvaturesRequest {
     type Work = GeometryWork;
-    type Answer = CurvaturesResponse;
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<GeometryWork>, Problem> {

@@ -122,7 +122,6 @@ path: "/v1/laplace-beltrami/matrix", tag: "operators", answer: "The matrix"
 
 impl Operation for LaplaceBeltramiRequest {
     type Work = AppliedWork;
-    type Answer = LaplaceBeltramiResponse;
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<AppliedWork>, Problem> {
@@ -146,7 +145,6 @@ impl Operation for LaplaceBeltramiRequest {
 
 impl Operation for LaplaceBeltramiMatrixRequest {
     type Work = MatrixWork;
-    type Answer = LaplaceBeltramiMatrixResponse;
     const HAS_SURFACE: bool = true;
     const FORMATS: &[Format] = &[Format::Json, Format::Safetensors, Format::Npy];
 
@@ -220,7 +218,6 @@ path: "/v1/laplace-beltrami/sparse-matrix", tag: "operators", answer: "The matri
 
 impl Operation for LaplaceBeltramiSparseMatrixRequest {
     type Work = StencilWork;
-    type Answer = LaplaceBeltramiSparseMatrixResponse;
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<StencilWork>, Problem> {

@@ -76,7 +76,6 @@ path: "/v1/normals", tag: "geometry", answer: "Normals at the queries"
 
 impl Operation for NormalsRequest {
     type Work = GeometryWork;
-    type Answer = NormalsResponse;
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<GeometryWork>, Problem> {

@@ -106,7 +106,6 @@ path: "/v1/surface-gradient/matrix", tag: "operators", answer: "The matrices"
 
 impl Operation for SurfaceGradientRequest {
     type Work = AppliedWork;
-    type Answer = SurfaceGradientResponse;
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<AppliedWork>, Problem> {
@@ -135,7 +134,6 @@ impl Operation for SurfaceGradientRequest {
 
 impl Operation for SurfaceGradientMatrixRequest {
     type Work = MatrixWork;
-    type Answer = SurfaceGradientMatrixResponse;
     const HAS_SURFACE: bool = true;
     const FORMATS: &[Format] = &[Format::Json, Format::Safetensors, Format::Npy];
 
@@ -202,7 +200,6 @@ path: "/v1/surface-gradient/sparse-matrix", tag: "operators", answer: "The matri
 
 impl Operation for SurfaceGradientSparseMatrixRequest {
     type Work = StencilWork;
-    type Answer = SurfaceGradientSparseMatrixResponse;
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<StencilWork>, Problem> {

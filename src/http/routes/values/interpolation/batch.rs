@@ -88,7 +88,6 @@ path: "/v1/interpolation/batch", tag: "values", answer: "The functions at the qu
 
 impl Operation for InterpolationBatchRequest {
     type Work = Work;
-    type Answer = InterpolationBatchResponse;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let derivatives = checked_order(self.derivatives)?;
