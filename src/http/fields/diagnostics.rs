@@ -7,6 +7,7 @@ use super::hyperparameters::Hyperparameters;
 use super::kernel::KernelUsed;
 use super::schemas::CloudIdSchema;
 use crate::http::wire::write::answer::json_members;
+use gramian_numerics::error::SolverKind;
 use gramian_numerics::solver::{Disagreement, Outlier, Place};
 use gramian_numerics::surface::operators::{RowKind, Stencils};
 
@@ -44,6 +45,15 @@ pub enum SolverUsed {
     Iterative,
     /// Small systems of the points nearest to each query.
     Local,
+}
+
+impl From<SolverKind> for SolverUsed {
+    fn from(kind: SolverKind) -> Self {
+        match kind {
+            SolverKind::Dense => Self::Dense,
+            SolverKind::Local => Self::Local,
+        }
+    }
 }
 
 /// The subject of a warning.

@@ -23,6 +23,23 @@ pub enum KernelFamily {
     InverseMultiquadric,
 }
 
+impl From<Family> for KernelFamily {
+    fn from(family: Family) -> Self {
+        match family {
+            Family::Gauss => Self::Gauss,
+            Family::Laplace { .. } => Self::Laplace,
+            Family::Matern { .. } => Self::Matern,
+            Family::Wendland { .. } => Self::Wendland,
+            Family::InverseMultiquadric => Self::InverseMultiquadric,
+        }
+    }
+}
+
+/// The smoothness ν = p + ½ of the Matérn kernel of order p.
+pub fn nu_of(order: u8) -> f64 {
+    f64::from(order) + 0.5
+}
+
 /// A kernel `k(x, y) = variance · φ(r²)`.
 ///
 /// Here `r = |x − y|/length_scale`, or `r² = Σ (x_c − y_c)²/length_scales_c²`. A parameter of another family
@@ -209,7 +226,7 @@ impl From<&NumericalKernel> for KernelUsed {
     /// Reports every number used, so that a client can pin them.
     fn from(kernel: &NumericalKernel) -> Self {
         let mut full = Self {
-            family: KernelFamily::Gauss,
+            family: kernel.family().into(),
             length_scale: Some(kernel.length_scale()).filter(|_| !kernel.is_stretched()),
             length_scales: kernel.length_scales().map(<[f64]>::to_vec),
             variance: kernel.variance(),
@@ -218,18 +235,10 @@ impl From<&NumericalKernel> for KernelUsed {
             smoothness: None,
         };
         match kernel.family() {
-            Family::Gauss => full.family = KernelFamily::Gauss,
-            Family::InverseMultiquadric => full.family = KernelFamily::InverseMultiquadric,
-            Family::Laplace { epsilon } => {
-                full.family = KernelFamily::Laplace;
-                full.epsilon = Some(epsilon);
-            }
-            Family::Matern { order } => {
-                full.family = KernelFamily::Matern;
-                full.nu = Some(f64::from(order) + 0.5);
-            }
+            Family::Gauss | Family::InverseMultiquadric => {}
+            Family::Laplace { epsilon } => full.epsilon = Some(epsilon),
+            Family::Matern { order } => full.nu = Some(nu_of(order)),
             Family::Wendland { smoothness } => {
-                full.family = KernelFamily::Wendland;
                 full.smoothness = Some(match smoothness {
                     WendlandSmoothness::C2 => 2,
                     WendlandSmoothness::C4 => 4,

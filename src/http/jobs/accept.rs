@@ -8,9 +8,9 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
 
-use super::Runner;
 use super::idempotency::{Known, fingerprint, key_of, known};
 use super::look::{JobView, view_of_here};
+use super::{Runner, kept_headers};
 use crate::http::around::middleware::CLOUD_HEADER;
 use crate::http::around::trace::TraceParent;
 use crate::http::problem::Problem;
@@ -71,10 +71,7 @@ async fn accept(runner: Runner, request: Request) -> Result<Response, Problem> {
     let key = key_of(&parts.headers)?;
     let (bytes, _memory) = read_bytes(&app, owner, &parts.headers, body).await?;
     let path = parts.uri.path().to_owned();
-    let kept = KEPT_HEADERS.iter().filter_map(|name| {
-        let text = parts.headers.get(name)?.to_str().ok()?;
-        Some((name.as_str().to_owned(), text.to_owned()))
-    });
+    let kept = kept_headers(&parts.headers, &KEPT_HEADERS);
     let trace = parts.extensions.get::<TraceParent>().map(|parent| (TRACE.to_owned(), parent.to_string()));
     let request = JobRequest { path, headers: kept.chain(trace).collect() };
     let asked = Asked { owner, request, body: bytes.into() };

@@ -11,7 +11,7 @@ use futures_util::TryStreamExt;
 use tower::ServiceExt;
 
 use super::run::Attempt;
-use super::{Runner, restore_headers};
+use super::{Runner, kept_headers, restore_headers};
 use crate::http::around::middleware::{CLOUD_HEADER, with_problem_document};
 use crate::http::around::span::RequestSpan;
 use crate::http::problem::Problem;
@@ -180,10 +180,7 @@ impl Runner {
 }
 
 fn head_of(response: &Response) -> JobResult {
-    let kept = KEPT_HEADERS.iter().filter_map(|name| {
-        let text = response.headers().get(name)?.to_str().ok()?;
-        Some((name.as_str().to_owned(), text.to_owned()))
-    });
+    let kept = kept_headers(response.headers(), &KEPT_HEADERS);
     let outcome = if response.status().is_success() { Outcome::Succeeded } else { Outcome::Failed };
     JobResult { outcome, status: response.status().as_u16(), headers: kept.collect() }
 }

@@ -46,6 +46,14 @@ pub struct Runner {
     pub routes: Router,
 }
 
+/// Returns headers of these names as text, to be kept.
+fn kept_headers(headers: &HeaderMap, names: &'static [HeaderName]) -> impl Iterator<Item = (String, String)> {
+    names.iter().filter_map(|name| {
+        let text = headers.get(name)?.to_str().ok()?;
+        Some((name.as_str().to_owned(), text.to_owned()))
+    })
+}
+
 /// Inserts headers of a request or an answer that was kept as text.
 pub fn restore_headers(headers: &mut HeaderMap, kept: &[(String, String)]) {
     for (name, value) in kept {

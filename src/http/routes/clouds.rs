@@ -30,8 +30,7 @@ use crate::store::clouds::{CloudPage, ListedCloud, RegisteredCloud};
 use crate::store::key::CloudId;
 use crate::store::objects::cloud_object::CloudHead;
 use crate::store::objects::{ListWindow, Listed};
-use gramian_numerics::points::sampling::sampling_price;
-use gramian_numerics::points::sampling::{NearestRange, Scales};
+use gramian_numerics::points::sampling::{NearestRange, Scales, sampling_price};
 
 /// Default number of clouds in a page.
 const DEFAULT_PAGE: usize = 50;
@@ -344,17 +343,15 @@ fn parse_window(query: &str) -> Result<ListWindow, Problem> {
     for pair in query.split('&').filter(|pair| !pair.is_empty()) {
         let (name, value) = pair.split_once('=').unwrap_or((pair, ""));
         match name {
-            "limit" => match value.parse() {
-                Ok(limit) if (1..=MAX_PAGE).contains(&limit) => window.n = limit,
-                _ => {
-                    let detail = format!("limit must be an integer from 1 to {MAX_PAGE}");
-                    return Err(Problem::invalid_request("/limit", detail));
-                }
-            },
-            "cursor" => match Cursor::parse(value) {
-                Some(cursor) => window.after = Some(cursor.0),
-                None => return Err(Problem::invalid_request("/cursor", "this is no cursor of a page")),
-            },
+            "limit" => {
+                let limit = value.parse().ok().filter(|limit| (1..=MAX_PAGE).contains(limit));
+                let detail = format!("limit must be an integer from 1 to {MAX_PAGE}");
+                window.n = limit.ok_or_else(|| Problem::invalid_request("/limit", detail))?;
+            }
+            "cursor" => {
+                let refused = || Problem::invalid_request("/cursor", "this is no cursor of a page");
+                window.after = Some(Cursor::parse(value).ok_or_else(refused)?.0);
+            }
             _ => {
                 let pointer = format!("/{}", name.chars().take(64).collect::<String>());
                 return Err(Problem::invalid_request(pointer, "unknown query parameter"));

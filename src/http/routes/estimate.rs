@@ -28,14 +28,13 @@ use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
 use crate::http::routes::clouds::CloudRequest;
 use crate::http::serve::intake::{ReceivedBody, read_body};
-use crate::http::serve::operation::{self, Named, REQUEST_FORMATS};
+use crate::http::serve::operation::{self, Declared, REQUEST_FORMATS};
 use crate::http::state::app::App;
 use crate::http::wire::read::body::UnpackedBody;
 use crate::http::wire::read::limits::ParseContext;
 use crate::http::wire::read::without::WithOperation;
 use crate::http::wire::write::json::Json;
 use crate::store::Owner;
-use gramian_numerics::error::SolverKind;
 
 /// A request of another operation, with the name of that operation as a further member.
 pub struct EstimateRequest;
@@ -141,7 +140,7 @@ fn name_of(
 macro_rules! operations {
     ($($request:ty),* $(,)?) => {
         /// Names of all operations that can be estimated.
-        pub const NAMES: &[&str] = &[$(<$request as Named>::NAME),*];
+        pub const NAMES: &[&str] = &[$(<$request as Declared>::NAME),*];
 
         async fn estimate_of(
             operation: &str,
@@ -149,9 +148,9 @@ macro_rules! operations {
             admission: &Arc<Admission>,
             intake: ReceivedBody,
         ) -> Result<Json<EstimateResponse>, Problem> {
-            $(if operation == <$request as Named>::NAME {
+            $(if operation == <$request as Declared>::NAME {
                 let estimate = operation::estimate::<$request>(app, admission, intake).await?;
-                return Ok(EstimateResponse::of(<$request as Named>::NAME, estimate));
+                return Ok(EstimateResponse::of(<$request as Declared>::NAME, estimate));
             })*
             let detail = format!("no operation of this name can be estimated; there are {}", NAMES.join(", "));
             Err(Problem::invalid_request("/operation", detail))
@@ -163,7 +162,7 @@ macro_rules! operations {
         /// # Errors
         /// Returns the problem that the request would be refused with.
         pub fn read_as(operation: &str, body: &UnpackedBody, context: &ParseContext<'_>) -> Result<(), Problem> {
-            $(if operation == <$request as Named>::NAME {
+            $(if operation == <$request as Declared>::NAME {
                 return body.parse::<$request>(context).map(drop);
             })*
             body.parse::<CloudRequest>(context).map(drop)
@@ -193,10 +192,7 @@ impl EstimateResponse {
         let operation::Estimate { solver, outlook, seconds, is_admissible } = estimate;
         Json(Self {
             operation,
-            solver: match solver {
-                SolverKind::Dense => SolverUsed::Dense,
-                SolverKind::Local => SolverUsed::Local,
-            },
+            solver: solver.into(),
             flops: outlook.flops,
             bytes: outlook.n_bytes as u64,
             seconds,

@@ -178,13 +178,9 @@ pub async fn get_job_result(
     let waiting = if first.has_ended() { None } else { Some(follow(&app, owner)?) };
     let deadline = app.config.deadline();
     let patience = deadline.saturating_sub(MARGIN).max(deadline / 2);
-    match tokio::time::timeout(patience, look_until_ended(&app, owner, id)).await {
-        Ok(view) => view?,
-        Err(_) => {
-            let detail = "the job has not ended: it goes on, ask for its result again";
-            return Err(Problem::new(Slug::DeadlineExceeded, detail));
-        }
-    };
+    let ended = tokio::time::timeout(patience, look_until_ended(&app, owner, id)).await;
+    let detail = "the job has not ended: it goes on, ask for its result again";
+    ended.map_err(|_| Problem::new(Slug::DeadlineExceeded, detail))??;
     drop(waiting);
     let name = app.keys.name_of(owner);
     let found = app.jobs.objects.get_result(&name, id).await.map_err(|error| unavailable(&error))?;

@@ -1,6 +1,7 @@
 //! Declaration of operations that compute.
 
-/// Declares the handler of an operation that computes, its name, and its entry in the `OpenAPI` document.
+/// Declares an operation that computes: its handler, its name, its answer, and its entry in the `OpenAPI`
+/// document.
 ///
 /// The documentation is that of the document: a line as summary, and the description. Invocations are not
 /// indented, because the document has the line breaks of the description.
@@ -29,8 +30,9 @@ macro_rules! operation {
             $crate::http::serve::operation::serve::<$request>(app, owner, request).await
         }
 
-        impl $crate::http::serve::operation::Named for $request {
+        impl $crate::http::serve::operation::Declared for $request {
             const NAME: &'static str = stringify!($name);
+            type Answer = $answer;
         }
     };
 }

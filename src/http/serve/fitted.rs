@@ -54,11 +54,7 @@ impl Fits {
     /// # Errors
     /// Returns the errors of [`Solution::of`] as a [`Problem`].
     pub fn interpolant(&self, values: &Values, observer: &JobObserver) -> Result<Interpolant, Problem> {
-        let solve = |known| {
-            let merged = self.main.plan.merged(&values.list);
-            self.main.model().interpolant(&merged, self.main.plan.process.mean, known, observer)
-        };
-        self.with_known_weights(values.key, solve, |function| Some(&function.solution))
+        self.function(&values.list, values.key, self.main.plan.process.mean, observer)
     }
 
     /// Returns the function through the constant 1, without a mean. It shows the quality of a fit without
@@ -68,11 +64,19 @@ impl Fits {
     /// Returns the errors of [`Solution::of`] as a [`Problem`].
     pub fn interpolant_of_one(&self, observer: &JobObserver) -> Result<Interpolant, Problem> {
         let ones = vec![1.0; self.main.plan.stored.cloud.n_points()];
-        let solve = |known| {
-            let merged = self.main.plan.merged(&ones);
-            self.main.model().interpolant(&merged, Mean::Zero, known, observer)
-        };
-        self.with_known_weights(ValuesKey::of(&ones), solve, |function| Some(&function.solution))
+        self.function(&ones, ValuesKey::of(&ones), Mean::Zero, observer)
+    }
+
+    fn function(
+        &self,
+        values: &[f64],
+        key: ValuesKey,
+        mean: Mean,
+        observer: &JobObserver,
+    ) -> Result<Interpolant, Problem> {
+        let merged = self.main.plan.merged(values);
+        let solve = |known| self.main.model().interpolant(&merged, mean, known, observer);
+        self.with_known_weights(key, solve, |function| Some(&function.solution))
     }
 
     /// Solves with cached weights of these values, if there are any. New weights are cached.

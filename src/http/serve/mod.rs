@@ -1,6 +1,6 @@
 //! The way of a request from its body to its answer, the same for every operation.
 
-mod diagnostics;
+pub mod answers;
 pub mod direct;
 pub mod durable;
 
@@ -12,7 +12,5 @@ pub mod intake;
 pub mod plan;
 pub mod planner;
 pub mod sampling;
-pub mod surface;
-pub mod values;
 
 mod report;

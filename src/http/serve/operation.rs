@@ -35,16 +35,17 @@ use crate::store::key::CloudId;
 use gramian_numerics::error::SolverKind;
 
 /// A request with the operation that it is sent to.
-pub trait Named {
+pub trait Declared {
     /// Operation id in the OpenAPI document.
     const NAME: &'static str;
+
+    type Answer: Answer;
 }
 
 /// A request that needs a model.
-pub trait Operation: Named + HasCloud + DeserializeOwned + Send + 'static {
+pub trait Operation: Declared + HasCloud + DeserializeOwned + Send + 'static {
     /// Inputs of `compute` that remain after the request is checked.
     type Work: Send + 'static;
-    type Answer: Answer;
 
     /// Formats of answers, the preferred one first. Answers of one matrix also have npy.
     const FORMATS: &'static [Format] = &[Format::Json, Format::Safetensors];

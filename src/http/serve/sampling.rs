@@ -8,10 +8,8 @@ use crate::http::problem::{Pointers, Problem};
 use crate::http::state::app::App;
 use crate::store::clouds::RegisteredCloud;
 use gramian_numerics::error::NumericsError;
-use gramian_numerics::points::noise::estimate_noise;
-use gramian_numerics::points::noise::noise_flops;
-use gramian_numerics::points::sampling::Sampling;
-use gramian_numerics::points::sampling::sampling_flops;
+use gramian_numerics::points::noise::{estimate_noise, noise_flops};
+use gramian_numerics::points::sampling::{Sampling, sampling_flops};
 use gramian_numerics::selection::{Learned, learning_price};
 
 /// Finds the facts about cloud or values that a fit lacks.

@@ -28,8 +28,8 @@ request! {
         pub orientation: Option<OrientationChoice>,
         /// Optional parts of the answer. Default: none.
         pub include: Option<Vec<GeometryInclude>>,
-        /// What `"solver": "local"` uses instead of learning: the hyperparameters of an answer for a cloud that
-        /// has these points.
+        /// What `"solver": "local"` takes instead of learning it: the hyperparameters of an answer about a
+        /// cloud that has these points.
         pub hyperparameters: Option<Hyperparameters>,
     }
 }
@@ -90,7 +90,6 @@ path: "/v1/curvatures", tag: "geometry", answer: "Curvatures at the queries"
 
 impl Operation for CurvaturesRequest {
     type Work = GeometryWork;
-    type Answer = CurvaturesResponse;
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<GeometryWork>, Problem> {

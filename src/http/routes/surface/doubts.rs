@@ -3,8 +3,8 @@
 use crate::http::compute::JobObserver;
 use crate::http::fields::Degenerate;
 use crate::http::problem::Problem;
+use crate::http::serve::answers::surface::SurfaceGeometry;
 use crate::http::serve::fitted::Fits;
-use crate::http::serve::surface::SurfaceGeometry;
 use gramian_numerics::surface::operators::{Judged, Operator};
 
 /// Answers of an operator that may be doubtful.

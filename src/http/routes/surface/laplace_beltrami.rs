@@ -123,7 +123,6 @@ path: "/v1/laplace-beltrami/matrix", tag: "operators", answer: "The matrix"
 
 impl Operation for LaplaceBeltramiRequest {
     type Work = AppliedWork;
-    type Answer = LaplaceBeltramiResponse;
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<AppliedWork>, Problem> {
@@ -147,7 +146,6 @@ impl Operation for LaplaceBeltramiRequest {
 
 impl Operation for LaplaceBeltramiMatrixRequest {
     type Work = MatrixWork;
-    type Answer = LaplaceBeltramiMatrixResponse;
     const HAS_SURFACE: bool = true;
     const FORMATS: &[Format] = &[Format::Json, Format::Safetensors, Format::Npy];
 
@@ -175,8 +173,8 @@ request! {
         pub queries: Option<Points>,
         /// The surface, if it differs from that of the request.
         pub geometry: Option<Geometry>,
-        /// What `"solver": "local"` uses instead of learning: the hyperparameters of an answer for a cloud that
-        /// has these points.
+        /// What `"solver": "local"` takes instead of learning it: the hyperparameters of an answer about a
+        /// cloud that has these points.
         pub hyperparameters: Option<Hyperparameters>,
     }
 }
@@ -217,7 +215,6 @@ path: "/v1/laplace-beltrami/sparse-matrix", tag: "operators", answer: "The matri
 
 impl Operation for LaplaceBeltramiSparseMatrixRequest {
     type Work = StencilWork;
-    type Answer = LaplaceBeltramiSparseMatrixResponse;
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<StencilWork>, Problem> {

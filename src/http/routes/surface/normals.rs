@@ -35,8 +35,8 @@ request! {
         #[serde(default, deserialize_with = "present_unless_empty")]
         #[schema(value_type = Option<Vec<Vec<f64>>>, max_items = 192)]
         pub sites: Option<Points>,
-        /// What `"solver": "local"` uses instead of learning: the hyperparameters of an answer for a cloud that
-        /// has these points.
+        /// What `"solver": "local"` takes instead of learning it: the hyperparameters of an answer about a
+        /// cloud that has these points.
         pub hyperparameters: Option<Hyperparameters>,
     }
 }
@@ -79,7 +79,6 @@ path: "/v1/normals", tag: "geometry", answer: "Normals at the queries"
 
 impl Operation for NormalsRequest {
     type Work = GeometryWork;
-    type Answer = NormalsResponse;
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<GeometryWork>, Problem> {

@@ -9,11 +9,11 @@ use crate::http::fields::{
     Degenerate, Diagnostics, Fit, Geometry, OrientationChoice, StencilsUsed, ValuesInclude,
 };
 use crate::http::problem::Problem;
+use crate::http::serve::answers::surface::SurfaceGeometry;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::Plan;
 use crate::http::serve::plan::{Cost, Values};
 use crate::http::serve::planner::{GivenValues, OperatorFits, Planner};
-use crate::http::serve::surface::SurfaceGeometry;
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::array::Array;
 use crate::http::wire::write::integers::Integers;

@@ -107,7 +107,6 @@ path: "/v1/surface-gradient/matrix", tag: "operators", answer: "The matrices"
 
 impl Operation for SurfaceGradientRequest {
     type Work = AppliedWork;
-    type Answer = SurfaceGradientResponse;
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<AppliedWork>, Problem> {
@@ -136,7 +135,6 @@ impl Operation for SurfaceGradientRequest {
 
 impl Operation for SurfaceGradientMatrixRequest {
     type Work = MatrixWork;
-    type Answer = SurfaceGradientMatrixResponse;
     const HAS_SURFACE: bool = true;
     const FORMATS: &[Format] = &[Format::Json, Format::Safetensors, Format::Npy];
 
@@ -163,8 +161,8 @@ request! {
         pub queries: Option<Points>,
         /// The surface, if it differs from that of the request.
         pub geometry: Option<Geometry>,
-        /// What `"solver": "local"` uses instead of learning: the hyperparameters of an answer for a cloud that
-        /// has these points.
+        /// What `"solver": "local"` takes instead of learning it: the hyperparameters of an answer about a
+        /// cloud that has these points.
         pub hyperparameters: Option<Hyperparameters>,
     }
 }
@@ -199,7 +197,6 @@ path: "/v1/surface-gradient/sparse-matrix", tag: "operators", answer: "The matri
 
 impl Operation for SurfaceGradientSparseMatrixRequest {
     type Work = StencilWork;
-    type Answer = SurfaceGradientSparseMatrixResponse;
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<StencilWork>, Problem> {

@@ -69,7 +69,6 @@ pub struct RegionsWork {
 
 impl Operation for RegionsRequest {
     type Work = RegionsWork;
-    type Answer = RegionsResponse;
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<RegionsWork>, Problem> {

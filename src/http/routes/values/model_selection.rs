@@ -203,7 +203,6 @@ const MAX_POINTS: usize = 5000;
 
 impl Operation for ModelSelectionRequest {
     type Work = Work;
-    type Answer = ModelSelectionResponse;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let search = Search::of(&self)?;

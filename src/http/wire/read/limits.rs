@@ -62,11 +62,11 @@ impl<'a> ParseContext<'a> {
         let problem = match (list, width) {
             (_, Some(width)) if length <= limit => too_many_coordinates(self.max_dimension, width, length),
             (List::Queries, _) => too_many_queries(limit, length),
-            (List::Numbers, _) => too_many_numbers(limit, length),
-            (List::ValueLists, _) => too_many_value_lists(limit, length),
-            (List::LengthScales, _) => too_many_length_scales(limit, length),
+            (List::Numbers, _) => too_many("entries", limit, length, ONE_PER_POINT),
+            (List::ValueLists, _) => too_many("lists of values", limit, length, SPLIT_LISTS),
+            (List::LengthScales, _) => too_many("length scales", limit, length, ONE_PER_COORDINATE),
             (List::Sites, _) => too_many_sites(limit, length),
-            (List::Quantiles, _) => too_many_quantiles(limit, length),
+            (List::Quantiles, _) => too_many("quantiles", limit, length, FEWER_QUANTILES),
             (List::Points | List::Coordinates | List::Other, _) => too_many_points(limit, length),
         };
         problem.at(pointer)
@@ -136,68 +136,52 @@ pub(super) struct Excess {
     pub(super) width: Option<usize>,
 }
 
+const ONE_PER_POINT: &str =
+    "send one per point of the cloud (operators raise the limit by GRAMIAN_MAX_POINTS)";
+const ONE_PER_COORDINATE: &str =
+    "send one per coordinate of the points (operators raise the limit by GRAMIAN_MAX_DIMENSION)";
+const SPLIT_LISTS: &str = "split them over several requests: the factorization is kept for the next one, so that this costs nothing \
+                           (operators raise the limit by GRAMIAN_MAX_POINTS)";
+const SPLIT_QUERIES: &str = "split them over several requests: the factorization is kept for the next one, so that this costs nothing \
+                             (operators raise the limit by GRAMIAN_MAX_QUERIES)";
+const FEWER_QUANTILES: &str =
+    "ask for fewer: they are those of normal distributions, whose means and variances say everything";
+const THIN: &str =
+    "thin the cloud, or cut it into parts that overlap (operators raise the limit by GRAMIAN_MAX_POINTS)";
+const COST_OF_DENSE: &str =
+    "it takes 4 n² bytes and n³/3 flops (operators raise the limit by GRAMIAN_MAX_DENSE_POINTS)";
+const PROJECT: &str =
+    "project the points to fewer dimensions (operators raise the limit by GRAMIAN_MAX_DIMENSION)";
+
+/// 413 for more of something than there may be.
+fn too_many(what: &str, limit: usize, required: usize, remedy: &str) -> Problem {
+    Problem::too_large(Slug::ProblemTooLarge, what, limit, Some(required)).with_remedy(remedy)
+}
+
 /// 413 for a cloud with too many points.
 pub fn too_many_points(limit: usize, required: usize) -> Problem {
-    Problem::too_large(Slug::ProblemTooLarge, "points", limit, Some(required)).with_remedy(
-        "thin the cloud, or cut it into parts that overlap (operators raise the limit by GRAMIAN_MAX_POINTS)",
-    )
+    too_many("points", limit, required, THIN)
 }
 
 /// 413 for a cloud with too many points for a dense factorization.
 pub fn too_many_dense_points(limit: usize, required: usize) -> Problem {
-    Problem::too_large(Slug::ProblemTooLarge, "points in a dense factorization", limit, Some(required))
-        .with_remedy(
-            "it takes 4 n² bytes and n³/3 flops (operators raise the limit by GRAMIAN_MAX_DENSE_POINTS)",
-        )
+    too_many("points in a dense factorization", limit, required, COST_OF_DENSE)
 }
 
 /// 413 for too many queries.
 pub fn too_many_queries(limit: usize, required: usize) -> Problem {
-    Problem::too_large(Slug::ProblemTooLarge, "queries", limit, Some(required)).with_remedy(
-        "split them over several requests: the factorization is kept for the next one, so that this costs nothing (operators \
-         raise the limit by GRAMIAN_MAX_QUERIES)",
-    )
+    too_many("queries", limit, required, SPLIT_QUERIES)
 }
 
 /// 413 for points with too many coordinates, with a hint if the `n_rows` rows look like columns.
 pub fn too_many_coordinates(limit: usize, required: usize, n_rows: usize) -> Problem {
-    let remedy = if n_rows <= limit {
-        transposed(n_rows, required)
-    } else {
-        "project the points to fewer dimensions (operators raise the limit by GRAMIAN_MAX_DIMENSION)"
-            .to_owned()
-    };
-    Problem::too_large(Slug::ProblemTooLarge, "coordinates a point", limit, Some(required))
-        .with_remedy(&remedy)
-}
-
-fn too_many_numbers(limit: usize, required: usize) -> Problem {
-    Problem::too_large(Slug::ProblemTooLarge, "entries", limit, Some(required))
-        .with_remedy("send one per point of the cloud (operators raise the limit by GRAMIAN_MAX_POINTS)")
-}
-
-fn too_many_value_lists(limit: usize, required: usize) -> Problem {
-    Problem::too_large(Slug::ProblemTooLarge, "lists of values", limit, Some(required)).with_remedy(
-        "split them over several requests: the factorization is kept for the next one, so that this costs nothing (operators \
-         raise the limit by GRAMIAN_MAX_POINTS)",
-    )
-}
-
-fn too_many_length_scales(limit: usize, required: usize) -> Problem {
-    Problem::too_large(Slug::ProblemTooLarge, "length scales", limit, Some(required)).with_remedy(
-        "send one per coordinate of the points (operators raise the limit by GRAMIAN_MAX_DIMENSION)",
-    )
+    let remedy = if n_rows <= limit { transposed(n_rows, required) } else { PROJECT.to_owned() };
+    too_many("coordinates a point", limit, required, &remedy)
 }
 
 fn too_many_sites(limit: usize, required: usize) -> Problem {
     Problem::too_large(Slug::ProblemTooLarge, "sites", limit, Some(required))
         .with_remedy("send some of them, spread over the surface: more would say the same")
-}
-
-fn too_many_quantiles(limit: usize, required: usize) -> Problem {
-    Problem::too_large(Slug::ProblemTooLarge, "quantiles", limit, Some(required)).with_remedy(
-        "ask for fewer: they are those of normal distributions, whose means and variances say everything",
-    )
 }
 
 /// The remedy for a client whose rows are columns.

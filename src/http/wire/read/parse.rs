@@ -111,6 +111,20 @@ mod tests {
     struct Request {
         points: Points,
         alpha: Option<f64>,
+        family: Option<Family>,
+        vary: Option<Vec<Bounds>>,
+    }
+
+    #[derive(Debug, serde::Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    enum Family {
+        Gauss,
+    }
+
+    #[derive(Debug, serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Bounds {
+        max: f64,
     }
 
     fn refusal(text: &str) -> (Slug, String) {
@@ -151,6 +165,24 @@ mod tests {
             (r#"[]"#, ""),
         ] {
             assert_eq!(refusal(text), (Slug::InvalidRequest, pointer.to_owned()), "{text}");
+        }
+    }
+
+    #[test]
+    fn objects_are_objects_and_words_are_words() {
+        let with = |member: &str| format!(r#"{{"points": [[1]], {member}}}"#);
+        let text = with(r#""family": "gauss", "vary": [{"max": 2}]"#);
+        let request: Request = parse_json(text.as_bytes(), &ParseContext::UNLIMITED).unwrap();
+        assert!(matches!(request.family, Some(Family::Gauss)) && request.vary.unwrap()[0].max == 2.0);
+        for (member, pointer) in [
+            (r#""family": null"#, "/family"),
+            (r#""family": {"gauss": null}"#, "/family"),
+            (r#""family": ["gauss"]"#, "/family"),
+            (r#""vary": null"#, "/vary"),
+            (r#""vary": [null]"#, "/vary/0"),
+            (r#""vary": [[2]]"#, "/vary/0"),
+        ] {
+            assert_eq!(refusal(&with(member)), (Slug::InvalidRequest, pointer.to_owned()), "{member}");
         }
     }
 

@@ -5,11 +5,11 @@ use crate::http::compute::JobObserver;
 use crate::http::fields::{Diagnostics, Fit, MeanChoice, ValuesInclude, request};
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
+use crate::http::serve::answers::values::mean_coefficients;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::plan::Cost;
 use crate::http::serve::planner::{DenseOnly, Planner, value_lists};
-use crate::http::serve::values::mean_coefficients;
 use crate::http::wire::read::points::{Points, ValueLists};
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
@@ -88,7 +88,6 @@ path: "/v1/interpolation/batch", tag: "values", answer: "The functions at the qu
 
 impl Operation for InterpolationBatchRequest {
     type Work = Work;
-    type Answer = InterpolationBatchResponse;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let derivatives = checked_order(self.derivatives)?;

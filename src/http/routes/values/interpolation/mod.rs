@@ -99,7 +99,6 @@ impl Work {
 
 impl Operation for InterpolationRequest {
     type Work = Work;
-    type Answer = InterpolationResponse;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let derivatives = checked_order(self.derivatives)?;

@@ -8,6 +8,7 @@ use super::{
     N_ALPHAS, PathEntry, SelectionCriterion, SelectionParameter,
 };
 use crate::http::compute::JobObserver;
+use crate::http::fields::kernel::nu_of;
 use crate::http::fields::{KernelFamily, KernelUsed};
 use crate::http::problem::Problem;
 use crate::http::serve::fitted::Fits;
@@ -367,14 +368,8 @@ fn path(
 
 fn family_scores(selected: &Selected) -> Vec<FamilyScore> {
     let one = |&(family, score): &(Family, Option<f64>)| {
-        let (family, nu) = match family {
-            Family::Gauss => (KernelFamily::Gauss, None),
-            Family::Laplace { .. } => (KernelFamily::Laplace, None),
-            Family::Matern { order } => (KernelFamily::Matern, Some(f64::from(order) + 0.5)),
-            Family::Wendland { .. } => (KernelFamily::Wendland, None),
-            Family::InverseMultiquadric => (KernelFamily::InverseMultiquadric, None),
-        };
-        FamilyScore { family, nu, score: Nullable(score) }
+        let nu = if let Family::Matern { order } = family { Some(nu_of(order)) } else { None };
+        FamilyScore { family: family.into(), nu, score: Nullable(score) }
     };
     selected.families.iter().map(one).collect()
 }

@@ -88,7 +88,6 @@ path: "/v1/posterior/batch", tag: "values", answer: "The posteriors at the queri
 
 impl Operation for PosteriorBatchRequest {
     type Work = Work;
-    type Answer = PosteriorBatchResponse;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let given = value_lists(std::mem::take(&mut self.values))?;

@@ -125,7 +125,6 @@ path: "/v1/posterior", tag: "values", answer: "The posterior at the queries"
 
 impl Operation for PosteriorRequest {
     type Work = Work;
-    type Answer = PosteriorResponse;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let given = GivenValues::one(std::mem::take(&mut self.values));

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use super::fitted::Fits;
 use crate::http::compute::JobObserver;
 use crate::http::fields::{
     Degenerate, DegenerateReason, Diagnostics, StencilsUsed, SurfaceUsed, Warning, WarningCode,
 };
 use crate::http::problem::Problem;
+use crate::http::serve::fitted::Fits;
 use crate::http::wire::write::array::Array;
 use gramian_numerics::error::NumericsError;
 use gramian_numerics::function::interpolant::Interpolant;

@@ -1,11 +1,10 @@
 //! Diagnostics of an answer, from the plan of its fit and the report of its model.
 
-use super::fitted::Fitted;
-use super::plan::words;
 use crate::http::fields::{
-    Diagnostics, FactorizationUsed, Hyperparameters, KernelUsed, SolverUsed, Warning, WarningCode,
+    Diagnostics, FactorizationUsed, Hyperparameters, KernelUsed, Warning, WarningCode,
 };
-use gramian_numerics::error::SolverKind;
+use crate::http::serve::fitted::Fitted;
+use crate::http::serve::plan::words;
 use gramian_numerics::model::Report;
 use gramian_numerics::solver::trend::Trend;
 use gramian_numerics::solver::{Disagreement, Method, Outlier};
@@ -32,10 +31,7 @@ impl Fitted {
             dimension: cloud.dimension(),
             kernel,
             alpha,
-            solver: match plan.recipe.solver() {
-                SolverKind::Dense => SolverUsed::Dense,
-                SolverKind::Local => SolverUsed::Local,
-            },
+            solver: plan.recipe.solver().into(),
             solver_reason: plan.reason.map(|reason| words(reason).to_owned()),
             factorization: match report.method {
                 Some(Method::Cholesky) => FactorizationUsed::Cholesky,

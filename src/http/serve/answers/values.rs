@@ -1,10 +1,10 @@
 //! Values at queries, with the diagnostics of their answer.
 
-use super::fitted::Fits;
-use super::plan::Values;
 use crate::http::compute::JobObserver;
 use crate::http::fields::Diagnostics;
 use crate::http::problem::Problem;
+use crate::http::serve::fitted::Fits;
+use crate::http::serve::plan::Values;
 use crate::http::wire::write::array::Array;
 use gramian_numerics::function::batch::Batch;
 use gramian_numerics::model::{EachAt, JetRequest, ValuesAt};

@@ -1,0 +1,5 @@
+//! Parts of answers that many operations share: values and surfaces at the queries, and diagnostics.
+
+mod diagnostics;
+pub mod surface;
+pub mod values;
