@@ -125,7 +125,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::function::functionals::{deviations, has_variance};
+    use crate::function::functionals::{ScaledFit, deviations, has_variance};
     use crate::observer::Unobserved;
     use crate::solver::trend::Mean;
     use crate::solver::{Solver, System};
@@ -144,7 +144,7 @@ mod tests {
     fn functionals() -> (Cloud, Vec<JetFunctional>) {
         let queries = Cloud::new(vec![0.3, 0.8, 0.5, 0.0, 0.0, 1.1], 3).unwrap();
         let of = |query| {
-            let bend = JetFunctional::second_derivative(query, 3, (0, 1));
+            let bend = JetFunctional::second_derivative(query, 3, 0, 1);
             [JetFunctional::value(query, 3), JetFunctional::derivative(query, &[0.6, 0.0, -0.8]), bend]
         };
         (queries, [of(0), of(1)].concat())
@@ -164,8 +164,8 @@ mod tests {
                 let process =
                     Process { kernel: &kernel, noise: ALPHA, factor: 1.0, trend: u.solution.trend.as_ref() };
                 let found = errors_under(&process, &u, &queries, &functionals, &Unobserved).unwrap();
-                let of = (&*u.solver, &*u.solution, 1.0);
-                let expected = deviations(of, &queries, &functionals, &Unobserved).unwrap().found;
+                let fit = ScaledFit { solver: &u.solver, solution: &u.solution, factor: 1.0 };
+                let expected = deviations(fit, &queries, &functionals, &Unobserved).unwrap().found;
                 for ((a, b), functional) in found.iter().zip(&expected).zip(&functionals) {
                     // Terms as large as the prior variance cancel, up to rounding.
                     let prior = functional.prior_variance(&kernel);

@@ -172,7 +172,7 @@ impl Patches {
                 observer.checkpoint()?;
                 let first = batch * lanes;
                 let places = room.put(self, queries, first..(first + lanes).min(m));
-                let estimates = self.estimates(room, &places, [&models, &stiff], (d, are_points));
+                let estimates = self.estimates(room, &places, [&models, &stiff], are_points);
                 for (lane, (place, estimate)) in places.iter().zip(&estimates).enumerate() {
                     if let (Some(place), Some(estimate)) = (place, estimate) {
                         slots.put(lane, place, estimate, d, are_points);
@@ -191,8 +191,9 @@ impl Patches {
         room: &mut Room,
         places: &[Option<Neighbourhood>],
         [models, stiff]: [&[Model]; 2],
-        (d, are_points): (usize, bool),
+        are_points: bool,
     ) -> SmallVec<[Option<Estimate>; MAX_LANES]> {
+        let d = self.support.cloud().dimension();
         room.krige(models, Purpose::Prediction);
         let mut estimates = SmallVec::new();
         for (place, kriged) in places.iter().zip(&room.kriged) {

@@ -5,7 +5,7 @@ use std::ops::Range;
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::nodes::Nodes;
+use super::nodes::{Nodes, PackPlace};
 use super::regularization::Regularization;
 use crate::error::NumericsError;
 use crate::kernel::{Kernel, Pairs};
@@ -116,7 +116,7 @@ impl<S: Simd> Pairs<S> for Values<'_, S> {
     #[inline(always)]
     fn pack(&mut self, at: usize) -> (Pack<S>, ()) {
         let KernelColumn { nodes, kernel, x, .. } = self.column;
-        (nodes.scaled_distances(self.simd, (self.block, at), x, kernel, |_, _| ()), ())
+        (nodes.scaled_distances(self.simd, PackPlace { block: self.block, at }, x, kernel, |_, _| ()), ())
     }
 
     #[inline(always)]

@@ -5,7 +5,7 @@
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::nodes::{Nodes, blocked};
+use super::nodes::{Nodes, PackPlace, blocked};
 use crate::error::NumericsError;
 use crate::kernel::{Kernel, Pairs};
 use crate::machine::registers::{BLOCK, Block, Pack};
@@ -141,7 +141,7 @@ impl<S: Simd> Pairs<S> for Row<'_, S> {
     #[inline(always)]
     fn pack(&mut self, at: usize) -> (Pack<S>, ()) {
         let (nodes, kernel, x, block) = self.position;
-        (nodes.scaled_distances(self.simd, (block, at), x, kernel, |_, _| ()), ())
+        (nodes.scaled_distances(self.simd, PackPlace { block, at }, x, kernel, |_, _| ()), ())
     }
 
     #[inline(always)]

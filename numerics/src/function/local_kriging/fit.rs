@@ -155,12 +155,12 @@ impl Fit<'_> {
             if parts.variances {
                 sure[0] = kernel.at_zero() - room.sums[places.explained];
                 self.check_is_rounding(query, sure[0], room.sums[places.norm_squared], &room.batch)?;
-                sure[0] += self.of_mean(query, Quantity::Value, (&room.sums, 0));
+                sure[0] += self.of_mean(query, Quantity::Value, &room.sums, 0);
             }
             for (at, slot) in sure[1..].iter_mut().enumerate() {
-                let quantity = self.quantities.get(&room.functionals, (lane, at));
+                let quantity = self.quantities.get(&room.functionals, lane, at);
                 let explained = room.sums[places.of_quantities() + at];
-                let unexplained = self.of_mean(query, quantity, (&room.sums, 1 + at));
+                let unexplained = self.of_mean(query, quantity, &room.sums, 1 + at);
                 let variance = quantity.prior_variance(kernel) - explained + unexplained;
                 // NaN propagates.
                 *slot = if variance < 0.0 { -0.0 } else { quantity.unit() * variance.sqrt() };
@@ -177,7 +177,7 @@ impl Fit<'_> {
     /// h is the part of the mean's functions that the neighbours do not explain. C is the covariance of the
     /// functions' coefficients (Rasmussen and Williams 2006, eq. 2.42). `place` is that of the quantity: 0
     /// for the value, then the others in order.
-    fn of_mean(&self, query: usize, quantity: Quantity<'_>, (sums, place): (&[f64], usize)) -> f64 {
+    fn of_mean(&self, query: usize, quantity: Quantity<'_>, sums: &[f64], place: usize) -> f64 {
         let Some(TrendUncertainty { basis, covariance }) = self.uncertainty else { return 0.0 };
         let mut unexplained = quantity.on_mean(basis, self.queries.point(query));
         let first = Found::of(self.queries.dimension()).of_functions(&self.parts) + place;

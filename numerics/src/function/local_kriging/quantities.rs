@@ -113,7 +113,7 @@ impl<'a> Quantities<'a> {
     }
 
     /// Returns quantity number `at` of a lane. `functionals` are those of all lanes, `count` for each.
-    pub(super) fn get<'b>(&'b self, functionals: &'b [Sized], (lane, at): (usize, usize)) -> Quantity<'b> {
+    pub(super) fn get<'b>(&'b self, functionals: &'b [Sized], lane: usize, at: usize) -> Quantity<'b> {
         match self {
             Self::Derivatives(derivatives) => Quantity::Derivative(&derivatives[at]),
             Self::Functionals { count, .. } => Quantity::Functional(&functionals[lane * count + at]),

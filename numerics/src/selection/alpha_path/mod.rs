@@ -93,10 +93,9 @@ fn by_spectrum(
     criterion: Criterion,
     observer: &dyn Observer,
 ) -> Result<Vec<f64>, NumericsError> {
-    let cloud = subject.cloud;
-    let kernel = at.kernel_on(cloud)?;
+    let kernel = at.kernel_on(subject.cloud)?;
     let is_restricted = criterion.needs_diagonal() && subject.n_functions > 0;
-    let spectrum = Spectrum::of(subject, (cloud, &kernel), is_restricted, observer)?;
+    let spectrum = Spectrum::of(subject, &kernel, is_restricted, observer)?;
     observer.enter(Stage::Evaluate);
     match criterion {
         Criterion::MarginalLikelihood => spectrum.likelihoods(subject, alphas, observer),

@@ -11,7 +11,6 @@ use crate::kernel::Kernel;
 use crate::machine::parallelism::parallelism;
 use crate::machine::vector::dot;
 use crate::observer::{Observer, Stage};
-use crate::points::cloud::Cloud;
 use crate::selection::learning::remove_mean;
 use crate::selection::subject::Subject;
 use crate::sums::gram::fill_lower_gram;
@@ -39,11 +38,11 @@ impl Spectrum {
     /// [`NumericsError::OutOfMemory`], [`NumericsError::Cancelled`].
     pub(super) fn of(
         subject: &Subject<'_>,
-        (cloud, kernel): (&Cloud, &Kernel),
+        kernel: &Kernel,
         is_restricted: bool,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
-        let n = cloud.n_points();
+        let (cloud, n) = (subject.cloud, subject.n_points());
         let mut gram = vec![0.0; n * n];
         observer.enter(Stage::Gram);
         fill_lower_gram(cloud, kernel, &Regularization::Uniform(0.0), &mut gram, n, observer)?;

@@ -84,7 +84,8 @@ impl Matrices {
     /// [`NumericsError::Cancelled`].
     pub(in crate::selection) fn factorize(
         &mut self,
-        (cloud, kernel): (&Cloud, &Kernel),
+        cloud: &Cloud,
+        kernel: &Kernel,
         noise: &Regularization,
         observer: &dyn Observer,
     ) -> Result<bool, NumericsError> {

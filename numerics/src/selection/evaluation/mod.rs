@@ -20,7 +20,7 @@ use crate::selection::learning::remove_mean;
 use crate::selection::parameters::Hyperparameters;
 use crate::selection::subject::{Subject, relative_noise};
 use crate::solver::trend::{Trend, solve_gram};
-use contraction::{PairWeights, contract};
+use contraction::{Contraction, PairWeights};
 use matrices::Matrices;
 use space::Space;
 
@@ -104,7 +104,7 @@ impl<'a> Evaluator<'a> {
         observer: &dyn Observer,
     ) -> Result<Option<State>, NumericsError> {
         let kernel = at.kernel_on(self.subject.cloud)?;
-        if !self.matrices.factorize((self.subject.cloud, &kernel), &at.noise, observer)? {
+        if !self.matrices.factorize(self.subject.cloud, &kernel, &at.noise, observer)? {
             return Ok(None);
         }
         observer.checkpoint()?;
@@ -163,8 +163,14 @@ impl<'a> Evaluator<'a> {
             left: &state.weights,
             right: &right,
         };
-        let kernel = (self.subject.cloud, &state.kernel);
-        let sums = contract(kernel, &weights, space.per_axis(), self.matrices.is_alone, observer)?;
+        let contraction = Contraction {
+            cloud: self.subject.cloud,
+            kernel: &state.kernel,
+            weights: &weights,
+            per_axis: space.per_axis(),
+            is_alone: self.matrices.is_alone,
+        };
+        let sums = contraction.sums(observer)?;
         Ok(space.gradient(at, &sums, weights.trace()))
     }
 

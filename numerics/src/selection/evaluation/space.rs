@@ -93,6 +93,11 @@ impl Space {
         self.free.iter().map(|free| (free.min.ln(), free.max.ln())).collect()
     }
 
+    /// The family at the start.
+    pub(in crate::selection) fn family(&self) -> Family {
+        self.base.family
+    }
+
     /// Logarithms at which the search begins.
     pub(in crate::selection) fn start(&self) -> Vec<f64> {
         self.numbers_of(&self.base)

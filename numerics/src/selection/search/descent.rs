@@ -198,7 +198,7 @@ pub enum Side {
 }
 
 /// Returns the bound that a number is at.
-pub(super) fn side(x: f64, (min, max): (f64, f64)) -> Option<Side> {
+pub(super) fn side(x: f64, min: f64, max: f64) -> Option<Side> {
     match x {
         _ if x - min <= near(x) => Some(Side::Min),
         _ if max - x <= near(x) => Some(Side::Max),

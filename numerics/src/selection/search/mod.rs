@@ -102,7 +102,7 @@ pub fn select(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Sele
     observer.enter(Stage::Factor);
     let jobs: Vec<(&Space, Vec<f64>)> = spaces.iter().flat_map(|space| starts(space, selection)).collect();
     let ended = run_all(&subject, selection, &jobs, observer)?;
-    best_of(&subject, selection, (families, &spaces), ended, observer)
+    best_of(&subject, selection, &spaces, ended, observer)
 }
 
 /// Refuses a varying ε unless one of the families has it.
@@ -171,13 +171,13 @@ fn run_all(
 fn best_of(
     subject: &Subject<'_>,
     selection: &Selection<'_>,
-    (families, spaces): (&[Family], &[Space]),
+    spaces: &[Space],
     ended: Vec<(Option<Found>, usize)>,
     observer: &dyn Observer,
 ) -> Result<Selected, NumericsError> {
     let mut evaluations: usize = ended.iter().map(|(_, evaluations)| evaluations).sum();
-    let per_family = ended.len() / families.len();
-    let mut scores = vec![None; families.len()];
+    let per_family = ended.len() / spaces.len();
+    let mut scores = vec![None; spaces.len()];
     let mut best: Option<(usize, Found, usize)> = None;
     for (at, (found, used)) in ended.into_iter().enumerate() {
         let Some(found) = found else { continue };
@@ -197,7 +197,7 @@ fn best_of(
     let (found, used) = finish(&mut evaluator, space, found, left, observer)?;
     evaluations += used;
     scores[family] = Some(found.score);
-    let sides = found.logarithms.iter().zip(space.bounds()).map(|(&x, bounds)| side(x, bounds));
+    let sides = found.logarithms.iter().zip(space.bounds()).map(|(&x, (min, max))| side(x, min, max));
     Ok(Selected {
         free: space.parameters().zip(sides).collect(),
         hyperparameters: found.hyperparameters,
@@ -206,7 +206,7 @@ fn best_of(
         evaluations,
         converged: found.converged,
         trend: evaluator.trend(),
-        families: families.iter().copied().zip(scores).collect(),
+        families: spaces.iter().map(Space::family).zip(scores).collect(),
     })
 }
 

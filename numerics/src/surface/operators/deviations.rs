@@ -13,7 +13,7 @@ use super::super::geometry::Geometry;
 use super::{Operator, regular};
 use crate::error::NumericsError;
 use crate::function::COLUMNS_AT_ONCE;
-use crate::function::functionals::{JetFunctional, deviations, has_variance};
+use crate::function::functionals::{JetFunctional, ScaledFit, deviations, has_variance};
 use crate::function::interpolant::Interpolant;
 use crate::machine::vector::{dot, norm};
 use crate::observer::Observer;
@@ -101,7 +101,8 @@ pub(super) struct Applied<'a> {
 impl Applied<'_> {
     /// Computes the deviations that come from the function alone: `[m]` or `[m, d]`.
     fn of_function(&self, operator: Operator, observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
-        let (solver, solution) = (&*self.interpolant.solver, &*self.interpolant.solution);
+        let Interpolant { solver, solution } = self.interpolant;
+        let fit = ScaledFit { solver, solution, factor: self.factor };
         let order = operator.order().degree();
         if !has_variance(solver.kernel(), order) {
             return Err(NumericsError::DerivativesVary { order });
@@ -112,7 +113,7 @@ impl Applied<'_> {
         for some in all.chunks((COLUMNS_AT_ONCE / width).max(1)) {
             let functionals: Vec<JetFunctional> =
                 some.iter().flat_map(|&query| functionals(self.geometry, operator, query)).collect();
-            let found = deviations((solver, solution, self.factor), self.queries, &functionals, observer)?;
+            let found = deviations(fit, self.queries, &functionals, observer)?;
             for (query, found) in some.iter().zip(found.found.chunks_exact(width)) {
                 total[query * width..][..width].copy_from_slice(found);
             }

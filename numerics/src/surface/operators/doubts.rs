@@ -12,7 +12,7 @@ use super::deviations::functionals;
 use super::{Operator, regular};
 use crate::error::NumericsError;
 use crate::function::errors::{Process, errors_under};
-use crate::function::functionals::{JetFunctional, deviations, has_variance};
+use crate::function::functionals::{JetFunctional, ScaledFit, deviations, has_variance};
 use crate::function::interpolant::Interpolant;
 use crate::kernel::Kernel;
 use crate::machine::vector::norm;
@@ -144,7 +144,7 @@ impl Judged<'_> {
             let process = Process { kernel, noise: *ratio, factor, trend: trend.as_ref() };
             return errors_under(&process, interpolant, queries, functionals, observer);
         }
-        match deviations((solver, solution, factor), queries, functionals, observer) {
+        match deviations(ScaledFit { solver, solution, factor }, queries, functionals, observer) {
             // The pivoted fallback has no variances, but it has weights.
             Err(NumericsError::NotPositiveDefinite { .. }) => {
                 let noise = match solver.regularization() {

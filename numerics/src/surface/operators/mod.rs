@@ -29,7 +29,7 @@ use crate::points::cloud::Cloud;
 use crate::solver::Solver;
 use crate::solver::trend::{Basis, Mean};
 use crate::sums::jets::{JetOrder, Jets, check_smooth_at};
-use crate::sums::nodes::Nodes;
+use crate::sums::nodes::{Nodes, PackPlace};
 pub(crate) use doubts::JUDGED_FUNCTIONALS;
 pub use doubts::Judged;
 pub use kriged::{Kriged, OfKriged};
@@ -296,11 +296,17 @@ impl<S: Simd> RowPairs<'_, S> {
         let Row { nodes, kernel, geometry, query, x, .. } = *self.row;
         let normal = geometry.normal(query);
         let mut along = Pack::splat(self.simd, 0.0);
-        let q = nodes.scaled_distances(self.simd, (self.block, at), x, kernel, |c, stretched| {
-            let difference = stretched * kernel.stretch(c);
-            along = difference.mul_add(Pack::splat(self.simd, normal[c]), along);
-            each(c, difference);
-        });
+        let q = nodes.scaled_distances(
+            self.simd,
+            PackPlace { block: self.block, at },
+            x,
+            kernel,
+            |c, stretched| {
+                let difference = stretched * kernel.stretch(c);
+                along = difference.mul_add(Pack::splat(self.simd, normal[c]), along);
+                each(c, difference);
+            },
+        );
         (q, along)
     }
 }
