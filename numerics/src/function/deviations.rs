@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::COLUMNS_AT_ONCE;
 use super::functionals::{JetFunctional, ScaledFit, deviations, has_variance};
 use super::interpolant::Interpolant;
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 
@@ -39,7 +39,7 @@ impl JetDeviations {
         queries: &Cloud,
         order: usize,
         observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    ) -> Result<Self> {
         let fit = ScaledFit { solver: &interpolant.solver, solution: &interpolant.solution, factor };
         if !has_variance(fit.solver.kernel(), order) {
             return Err(NumericsError::DerivativesVary { order });

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::functionals::{Covariant, JetFunctional};
 use super::interpolant::Interpolant;
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::kernel::Kernel;
 use crate::machine::vector::dot;
 use crate::observer::{Observer, Stage};
@@ -46,7 +46,7 @@ pub(crate) fn errors_under(
     queries: &Cloud,
     functionals: &[JetFunctional],
     observer: &dyn Observer,
-) -> Result<Vec<f64>, NumericsError> {
+) -> Result<Vec<f64>> {
     let mut found = Vec::with_capacity(functionals.len());
     for block in functionals.chunks(JUDGED_AT_ONCE) {
         // Normalised so that squares do not overflow.
@@ -65,7 +65,7 @@ fn errors_of_block(
     queries: &Cloud,
     functionals: &[JetFunctional],
     observer: &dyn Observer,
-) -> Result<Vec<f64>, NumericsError> {
+) -> Result<Vec<f64>> {
     let (solver, n) = (&interpolant.solver, interpolant.solver.n_points());
     let cloud = solver.cloud();
     observer.checkpoint()?;
@@ -105,7 +105,7 @@ fn weights_on_values(
     interpolant: &Interpolant,
     queries: &Cloud,
     functionals: &[JetFunctional],
-) -> Result<Vec<f64>, NumericsError> {
+) -> Result<Vec<f64>> {
     let (solver, n) = (&interpolant.solver, interpolant.solver.n_points());
     let mut weights = vec![0.0; n * functionals.len()];
     Covariant::of(solver.cloud(), solver.kernel()).fill(functionals, queries, &mut weights);

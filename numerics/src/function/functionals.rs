@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::COLUMNS_AT_ONCE;
 use super::mean_variance::MeanVariance;
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::kernel::{Kernel, Pairs};
 use crate::machine::registers::{BLOCK, Block, Pack};
 use crate::machine::small::{Small, zeros};
@@ -206,7 +206,7 @@ pub(crate) fn deviations(
     queries: &Cloud,
     functionals: &[JetFunctional],
     observer: &dyn Observer,
-) -> Result<Deviations, NumericsError> {
+) -> Result<Deviations> {
     let ScaledFit { solver, solution, factor } = fit;
     let (n, kernel) = (solver.n_points(), solver.kernel());
     solver.cloud().check_same_dimension(queries)?;

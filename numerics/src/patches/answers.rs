@@ -9,7 +9,7 @@ use super::neighbourhood::Neighbourhood;
 use super::pooled::Weighted;
 use super::regression::{Model, n_terms};
 use super::room::{Purpose, Room};
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::machine::instruction_set::InstructionSet;
 use crate::machine::lanes::MAX_LANES;
 use crate::machine::small::{Small, zeros};
@@ -149,14 +149,14 @@ impl Patches {
     /// of the cloud, with their noise.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
+    /// `NumericsError::Cancelled`.
     pub fn at(
         &self,
         queries: &Cloud,
         are_points: bool,
         with_deviations: bool,
         observer: &dyn Observer,
-    ) -> Result<PatchGeometry, NumericsError> {
+    ) -> Result<PatchGeometry> {
         let (m, d) = (queries.n_points(), queries.dimension());
         let mut geometry = PatchGeometry::unknown(m, d, with_deviations);
         if self.count < n_terms(d) + 2 {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::machine::heap::vec_bytes;
 use crate::observer::Observer;
 use crate::points::cells::{Cells, mean, second_moments};
@@ -34,8 +34,8 @@ impl Support {
     /// Averages cells of at most `group` points.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(crate) fn means(cloud: &Cloud, group: usize, observer: &dyn Observer) -> Result<Self, NumericsError> {
+    /// `NumericsError::Cancelled`.
+    pub(crate) fn means(cloud: &Cloud, group: usize, observer: &dyn Observer) -> Result<Self> {
         let d = cloud.dimension();
         let (mut coordinates, mut counts, mut moments) = (Vec::new(), Vec::new(), Vec::new());
         for cell in Cells::of_all(cloud, group).iter() {

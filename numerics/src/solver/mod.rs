@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use faer::MatMut;
 
-use super::error::{NotDefinite, NumericsError, Quantity, SolverKind};
+use super::error::{NotDefinite, NumericsError, Quantity, Result, SolverKind};
 use super::kernel::Kernel;
 use super::machine::pages::SpareBuffer;
 use super::observer::Observer;
@@ -47,7 +47,7 @@ impl Solver {
     ///
     /// # Errors
     /// [`NumericsError::OutOfMemory`], [`NumericsError::Cancelled`].
-    pub fn dense(system: System, observer: &dyn Observer) -> Result<Self, NumericsError> {
+    pub fn dense(system: System, observer: &dyn Observer) -> Result<Self> {
         let (spare, mut may_take) = (SpareBuffer::up_to(0), |_| true);
         Self::dense_in(Workspace { spare: &spare, may_take: &mut may_take }, system, observer)
     }
@@ -57,11 +57,7 @@ impl Solver {
     /// # Errors
     /// Returns the errors of [`Solver::dense`], and [`NumericsError::OutOfMemory`] also if it needs more than
     /// it may take.
-    pub fn dense_in(
-        workspace: Workspace<'_>,
-        system: System,
-        observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    pub fn dense_in(workspace: Workspace<'_>, system: System, observer: &dyn Observer) -> Result<Self> {
         Dense::factorize(workspace, system, observer).map(|dense| Self::Dense(Box::new(dense)))
     }
 
@@ -170,11 +166,7 @@ impl Solver {
     /// # Errors
     /// [`NumericsError::NotPositiveDefinite`] where the matrix has no such factor in float64;
     /// [`NumericsError::Cancelled`].
-    pub(crate) fn whiten_in_place(
-        &self,
-        columns: MatMut<'_, f64>,
-        observer: &dyn Observer,
-    ) -> Result<(), NumericsError> {
+    pub(crate) fn whiten_in_place(&self, columns: MatMut<'_, f64>, observer: &dyn Observer) -> Result<()> {
         self.as_dense().whiten_in_place(columns, observer)
     }
 
@@ -183,7 +175,7 @@ impl Solver {
     /// # Errors
     /// Returns [`NumericsError::Unsupported`] for more than [`MAX_INVERSE_DIAGONAL`] points, and the errors
     /// of [`Solver::whiten_in_place`].
-    pub(crate) fn inverse_diagonal(&self) -> Result<Vec<f64>, NumericsError> {
+    pub(crate) fn inverse_diagonal(&self) -> Result<Vec<f64>> {
         if self.n_points() > MAX_INVERSE_DIAGONAL {
             let solver = SolverKind::Dense;
             return Err(NumericsError::Unsupported { solver, quantity: Quantity::InverseDiagonal });
@@ -195,7 +187,7 @@ impl Solver {
     ///
     /// # Errors
     /// Returns the errors of [`Solver::whiten_in_place`].
-    pub(crate) fn log_determinant(&self) -> Result<f64, NumericsError> {
+    pub(crate) fn log_determinant(&self) -> Result<f64> {
         self.as_dense().log_determinant()
     }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::function::interpolant::Interpolant;
 use crate::kernel::defaults::{Purpose, default_fit};
 use crate::observer::Observer;
@@ -20,12 +20,8 @@ use crate::sums::regularization::Regularization;
 /// unit L.
 ///
 /// # Errors
-/// Returns [`NumericsError::Cancelled`]. Errors of the fit do not occur with this kernel and α.
-pub(crate) fn outward_directions(
-    cloud: &Cloud,
-    noise: f64,
-    observer: &dyn Observer,
-) -> Result<Vec<f64>, NumericsError> {
+/// Returns `NumericsError::Cancelled`. Errors of the fit do not occur with this kernel and α.
+pub(crate) fn outward_directions(cloud: &Cloud, noise: f64, observer: &dyn Observer) -> Result<Vec<f64>> {
     let coarse = thinned(cloud, n_coarse(cloud.n_points()));
     let coarse = match Merge::duplicates_of(&coarse) {
         Some((merged, _)) => merged,

@@ -14,7 +14,7 @@ mod curvature;
 mod orientation;
 mod request;
 
-use super::error::NumericsError;
+use super::error::Result;
 use super::function::interpolant::Interpolant;
 use super::observer::Observer;
 use crate::machine::vector::dot;
@@ -43,11 +43,7 @@ impl Surface {
     ///
     /// # Errors
     /// Returns the errors of [`SignatureSurface::of`].
-    pub fn of(
-        signature: Interpolant,
-        given: Option<&Cloud>,
-        observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    pub fn of(signature: Interpolant, given: Option<&Cloud>, observer: &dyn Observer) -> Result<Self> {
         Ok(SignatureSurface::of(signature, given, observer)?.into())
     }
 
@@ -89,12 +85,7 @@ impl Surface {
         }
     }
 
-    fn serve(
-        &self,
-        queries: &Cloud,
-        request: &GeometryRequest,
-        observer: &dyn Observer,
-    ) -> Result<Served, NumericsError> {
+    fn serve(&self, queries: &Cloud, request: &GeometryRequest, observer: &dyn Observer) -> Result<Served> {
         match self {
             Self::Signature(surface) => signature::serve(surface, queries, request, observer),
             Self::Local(surface) => surface.serve(queries, request, observer),

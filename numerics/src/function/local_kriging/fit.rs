@@ -5,7 +5,7 @@ use super::kriging::{Krige, Workspace};
 use super::parts::{Found, Parts};
 use super::quantities::{Quantities, Quantity, Sized};
 use super::{Asked, LocalKriging};
-use crate::error::{NotDefinite, NumericsError};
+use crate::error::{NotDefinite, NumericsError, Result};
 use crate::machine::instruction_set::InstructionSet;
 use crate::machine::vector::dot;
 use crate::points::cloud::Cloud;
@@ -92,7 +92,7 @@ impl Room {
     ///
     /// # Errors
     /// [`NumericsError::KernelNotSmooth`] if a query is a point of the cloud and that is refused.
-    pub(super) fn put(&mut self, fit: &Fit<'_>, first: usize, n_queries: usize) -> Result<(), NumericsError> {
+    pub(super) fn put(&mut self, fit: &Fit<'_>, first: usize, n_queries: usize) -> Result<()> {
         let LocalKriging { system, near, .. } = fit.moving;
         self.functionals.clear();
         for lane in 0..n_queries {
@@ -135,7 +135,7 @@ impl Fit<'_> {
         first: usize,
         jets: &mut [f64],
         sure: &mut [f64],
-    ) -> Result<usize, NumericsError> {
+    ) -> Result<usize> {
         let kernel = self.moving.system.kernel();
         let parts = self.parts;
         room.set.dispatch(Krige { batch: &room.batch, kernel, parts, workspace: &mut room.workspace });
@@ -189,13 +189,7 @@ impl Fit<'_> {
     }
 
     /// Checks that a negative variance is at least −τ, the tolerance of [`LocalKriging::at`].
-    fn check_is_rounding(
-        &self,
-        query: usize,
-        variance: f64,
-        norm_squared: f64,
-        batch: &Batch,
-    ) -> Result<(), NumericsError> {
+    fn check_is_rounding(&self, query: usize, variance: f64, norm_squared: f64, batch: &Batch) -> Result<()> {
         if variance >= 0.0 {
             return Ok(());
         }

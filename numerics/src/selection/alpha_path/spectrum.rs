@@ -6,7 +6,7 @@ use faer::linalg::evd::{ComputeEigenvectors, self_adjoint_evd, self_adjoint_evd_
 use faer::{MatMut, MatRef};
 use rayon::prelude::*;
 
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::kernel::Kernel;
 use crate::machine::parallelism::parallelism;
 use crate::machine::vector::dot;
@@ -41,7 +41,7 @@ impl Spectrum {
         kernel: &Kernel,
         is_restricted: bool,
         observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    ) -> Result<Self> {
         let (cloud, n) = (subject.cloud, subject.n_points());
         let mut gram = vec![0.0; n * n];
         observer.enter(Stage::Gram);
@@ -79,7 +79,7 @@ impl Spectrum {
 ///
 /// # Errors
 /// [`NumericsError::OutOfMemory`].
-fn decompose(matrix: &[f64], n: usize) -> Result<(Vec<f64>, Vec<f64>), NumericsError> {
+fn decompose(matrix: &[f64], n: usize) -> Result<(Vec<f64>, Vec<f64>)> {
     let (mut eigenvalues, mut vectors) = (vec![0.0; n], vec![0.0; n * n]);
     let par = parallelism((n as f64).powi(3));
     let requirement = self_adjoint_evd_scratch::<f64>(n, ComputeEigenvectors::Yes, par, Default::default());

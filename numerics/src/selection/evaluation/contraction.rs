@@ -8,7 +8,7 @@ use std::ops::Range;
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::kernel::{HUGE, Kernel, Pairs};
 use crate::machine::registers::{BLOCK, Block, Pack};
 use crate::observer::Observer;
@@ -83,8 +83,8 @@ impl Contraction<'_> {
     /// Computes the sums.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(in crate::selection) fn sums(&self, observer: &dyn Observer) -> Result<Sums, NumericsError> {
+    /// `NumericsError::Cancelled`.
+    pub(in crate::selection) fn sums(&self, observer: &dyn Observer) -> Result<Sums> {
         let (nodes, n) = (&Nodes::of(self.cloud), self.cloud.n_points());
         let task = |task: usize| {
             observer.checkpoint()?;
@@ -92,7 +92,7 @@ impl Contraction<'_> {
             Ok(nodes.dispatch(Columns { of: self, nodes, columns }))
         };
         let tasks = 0..n.div_ceil(COLUMNS_PER_TASK);
-        let parts: Result<Vec<Vec<f64>>, NumericsError> =
+        let parts: Result<Vec<Vec<f64>>> =
             if self.is_alone { tasks.map(task).collect() } else { tasks.into_par_iter().map(task).collect() };
         // Adding in the order of the tasks makes the sum independent of the threads.
         let mut total = vec![0.0; FIXED + self.n_axes()];

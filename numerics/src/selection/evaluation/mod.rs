@@ -11,7 +11,7 @@ pub(super) mod space;
 
 use faer::Mat;
 
-use crate::error::{NotDefinite, NumericsError};
+use crate::error::{NotDefinite, NumericsError, Result};
 use crate::kernel::Kernel;
 use crate::machine::vector::dot;
 use crate::observer::Observer;
@@ -85,11 +85,7 @@ impl<'a> Evaluator<'a> {
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`], and the errors of [`Hyperparameters::kernel_on`].
-    pub(super) fn score(
-        &mut self,
-        at: &Hyperparameters,
-        observer: &dyn Observer,
-    ) -> Result<Option<State>, NumericsError> {
+    pub(super) fn score(&mut self, at: &Hyperparameters, observer: &dyn Observer) -> Result<Option<State>> {
         Ok(self.state(at, observer)?.filter(|state| state.score.is_finite()))
     }
 
@@ -98,11 +94,7 @@ impl<'a> Evaluator<'a> {
     ///
     /// # Errors
     /// Returns the errors of [`Evaluator::score`].
-    pub(super) fn state(
-        &mut self,
-        at: &Hyperparameters,
-        observer: &dyn Observer,
-    ) -> Result<Option<State>, NumericsError> {
+    pub(super) fn state(&mut self, at: &Hyperparameters, observer: &dyn Observer) -> Result<Option<State>> {
         let kernel = at.kernel_on(self.subject.cloud)?;
         if !self.matrices.factorize(self.subject.cloud, &kernel, &at.noise, observer)? {
             return Ok(None);
@@ -144,7 +136,7 @@ impl<'a> Evaluator<'a> {
         at: &Hyperparameters,
         state: &State,
         observer: &dyn Observer,
-    ) -> Result<Vec<f64>, NumericsError> {
+    ) -> Result<Vec<f64>> {
         if space.n_free() == 0 {
             return Ok(Vec::new());
         }
@@ -194,7 +186,7 @@ impl<'a> Evaluator<'a> {
 
     /// Computes `P_ii = W_ii − |T_i|²`, and 0 where that is rounding: no other value then says anything about
     /// the value of the point.
-    fn diagonal(&mut self, of_mean: &[f64], observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
+    fn diagonal(&mut self, of_mean: &[f64], observer: &dyn Observer) -> Result<Vec<f64>> {
         self.matrices.invert_factor(observer)?;
         let n = self.subject.n_points();
         let entry = |(i, of_inverse): (usize, f64)| {

@@ -3,7 +3,7 @@
 use super::Learned;
 use super::grid::{Cell, Grid, N_FAMILIES};
 use super::search::Search;
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::observer::Observer;
 
 /// Largest ratio of the variance of the deep groups to that of all groups.
@@ -35,13 +35,13 @@ impl Agreement<'_> {
     /// has a feature that the cell does not expect.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`]. [`NumericsError::WeightsOverflow`] for values whose squares exceed
+    /// `NumericsError::Cancelled`. `NumericsError::WeightsOverflow` for values whose squares exceed
     /// float64.
     pub(super) fn decided(
         &mut self,
         best: [Cell; N_FAMILIES],
         observer: &dyn Observer,
-    ) -> Result<Option<Learned>, NumericsError> {
+    ) -> Result<Option<Learned>> {
         let best = self.best(best, observer)?;
         let mut cell = self.all.shortest(best, observer)?;
         let (mut of_groups, mut last) = (None, None);
@@ -65,7 +65,7 @@ impl Agreement<'_> {
     }
 
     /// Returns the best cell by all groups, the first of equals.
-    fn best(&mut self, cells: [Cell; N_FAMILIES], observer: &dyn Observer) -> Result<Cell, NumericsError> {
+    fn best(&mut self, cells: [Cell; N_FAMILIES], observer: &dyn Observer) -> Result<Cell> {
         let mut best = (cells[0], f64::INFINITY);
         for cell in cells {
             let height = self.height(cell, observer)?;
@@ -76,13 +76,13 @@ impl Agreement<'_> {
         Ok(best.0)
     }
 
-    fn height(&mut self, cell: Cell, observer: &dyn Observer) -> Result<f64, NumericsError> {
+    fn height(&mut self, cell: Cell, observer: &dyn Observer) -> Result<f64> {
         let of_deep = self.deep.as_mut().map_or(Ok(0.0), |deep| deep.height(cell, observer))?;
         Ok(self.all.height(cell, observer)? + of_deep)
     }
 
     /// Returns the verdict on a cell, or `None` if it does not explain the values in float64.
-    fn verdict(&mut self, cell: Cell, observer: &dyn Observer) -> Result<Option<Verdict>, NumericsError> {
+    fn verdict(&mut self, cell: Cell, observer: &dyn Observer) -> Result<Option<Verdict>> {
         let Some(all) = self.all.score(cell, observer)? else { return Ok(None) };
         let deep = match &mut self.deep {
             Some(deep) => deep.score(cell, observer)?,

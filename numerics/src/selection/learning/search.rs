@@ -2,7 +2,7 @@
 
 use super::grid::{Cell, Grid, N_CELLS, N_FAMILIES, Step, along_ridge};
 use super::likelihood::{Evidence, Score};
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::observer::Observer;
 
 /// Steps of a search from nothing, in ratios. Steps in length scales are half as long.
@@ -32,11 +32,8 @@ impl<'a> Search<'a> {
     /// Finds the best cell of each family. `None` if no kernel explains the values in float64.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(super) fn best(
-        &mut self,
-        observer: &dyn Observer,
-    ) -> Result<Option<[Cell; N_FAMILIES]>, NumericsError> {
+    /// `NumericsError::Cancelled`.
+    pub(super) fn best(&mut self, observer: &dyn Observer) -> Result<Option<[Cell; N_FAMILIES]>> {
         let Some(mut from) = self.least_of(self.grid.beginnings(), observer)? else { return Ok(None) };
         let mut best = [from; N_FAMILIES];
         for (family, best) in best.iter_mut().enumerate() {
@@ -54,12 +51,8 @@ impl<'a> Search<'a> {
     /// Finds the best cell of each family near one that was found on some of the values.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(super) fn best_from(
-        &mut self,
-        found: Cell,
-        observer: &dyn Observer,
-    ) -> Result<[Cell; N_FAMILIES], NumericsError> {
+    /// `NumericsError::Cancelled`.
+    pub(super) fn best_from(&mut self, found: Cell, observer: &dyn Observer) -> Result<[Cell; N_FAMILIES]> {
         let first = self.descend(found, &FINE, observer)?;
         let mut best = [first; N_FAMILIES];
         for (family, best) in best.iter_mut().enumerate().filter(|(family, _)| *family != first.family) {
@@ -74,8 +67,8 @@ impl<'a> Search<'a> {
     /// length scale open, the best one is mostly too long. The noise is the likeliest for the length scale.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(super) fn shortest(&mut self, best: Cell, observer: &dyn Observer) -> Result<Cell, NumericsError> {
+    /// `NumericsError::Cancelled`.
+    pub(super) fn shortest(&mut self, best: Cell, observer: &dyn Observer) -> Result<Cell> {
         let most = self.height(best, observer)? + AS_LIKELY;
         let mut found = best;
         while let Some(next) = self.shorter(found, observer)? {
@@ -90,12 +83,8 @@ impl<'a> Search<'a> {
     /// Finds the next shorter length scale with the likeliest noise for it, if there is one.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(super) fn shorter(
-        &mut self,
-        cell: Cell,
-        observer: &dyn Observer,
-    ) -> Result<Option<Cell>, NumericsError> {
+    /// `NumericsError::Cancelled`.
+    pub(super) fn shorter(&mut self, cell: Cell, observer: &dyn Observer) -> Result<Option<Cell>> {
         let straight = self.grid.moved(cell, Step { lengths: -1, ratios: 0 });
         let along = self.grid.moved(cell, along_ridge(cell.family, -1));
         match self.least_of(straight.into_iter().chain(along), observer)? {
@@ -104,7 +93,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn is_mostly_noise(&mut self, cell: Cell, observer: &dyn Observer) -> Result<bool, NumericsError> {
+    fn is_mostly_noise(&mut self, cell: Cell, observer: &dyn Observer) -> Result<bool> {
         let Some(score) = self.score(cell, observer)? else { return Ok(false) };
         Ok(self.against_noise(cell, score) > 0.0)
     }
@@ -112,12 +101,12 @@ impl<'a> Search<'a> {
     /// Returns the cell of the least height, the first of equals.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
+    /// `NumericsError::Cancelled`.
     pub(super) fn least_of(
         &mut self,
         cells: impl Iterator<Item = Cell>,
         observer: &dyn Observer,
-    ) -> Result<Option<Cell>, NumericsError> {
+    ) -> Result<Option<Cell>> {
         let mut best = None;
         for cell in cells {
             let height = self.height(cell, observer)?;
@@ -129,12 +118,7 @@ impl<'a> Search<'a> {
     }
 
     /// Moves in every direction that gains, with one stride after the other.
-    fn descend(
-        &mut self,
-        mut at: Cell,
-        strides: &[isize],
-        observer: &dyn Observer,
-    ) -> Result<Cell, NumericsError> {
+    fn descend(&mut self, mut at: Cell, strides: &[isize], observer: &dyn Observer) -> Result<Cell> {
         for &stride in strides {
             let lengths = (stride + 1) / 2;
             let across = [Step { lengths: 0, ratios: stride }, Step { lengths, ratios: 0 }];
@@ -153,7 +137,7 @@ impl<'a> Search<'a> {
     }
 
     /// Moves along a direction or against it as long as that gains. Steps double while they gain.
-    fn line(&mut self, begin: Cell, direction: Step, observer: &dyn Observer) -> Result<Cell, NumericsError> {
+    fn line(&mut self, begin: Cell, direction: Step, observer: &dyn Observer) -> Result<Cell> {
         for sign in [1, -1] {
             let (mut at, mut factor) = (begin, sign);
             while let Some(next) = self.grid.moved(at, direction.times(factor)) {
@@ -174,8 +158,8 @@ impl<'a> Search<'a> {
     /// does not explain the values in float64.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(super) fn height(&mut self, cell: Cell, observer: &dyn Observer) -> Result<f64, NumericsError> {
+    /// `NumericsError::Cancelled`.
+    pub(super) fn height(&mut self, cell: Cell, observer: &dyn Observer) -> Result<f64> {
         let Some(score) = self.score(cell, observer)? else { return Ok(f64::INFINITY) };
         Ok(score.negative_log + self.against_noise(cell, score))
     }
@@ -187,12 +171,8 @@ impl<'a> Search<'a> {
     /// Returns the score of a cell. `None` if it does not explain the values in float64.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(super) fn score(
-        &mut self,
-        cell: Cell,
-        observer: &dyn Observer,
-    ) -> Result<Option<Score>, NumericsError> {
+    /// `NumericsError::Cancelled`.
+    pub(super) fn score(&mut self, cell: Cell, observer: &dyn Observer) -> Result<Option<Score>> {
         if let Some(known) = self.scores[cell.slot()] {
             return Ok(known);
         }

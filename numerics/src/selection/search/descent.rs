@@ -12,7 +12,7 @@ use std::cell::RefCell;
 use slsqp::{Func, StopTols, minimize};
 
 use super::walk::{Best, Walk};
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::observer::Observer;
 use crate::selection::evaluation::Evaluator;
 use crate::selection::evaluation::space::Space;
@@ -59,14 +59,14 @@ pub(super) struct Found {
 /// if no solver would serve the start.
 ///
 /// # Errors
-/// [`NumericsError::Cancelled`], and the errors of [`Hyperparameters::kernel_on`].
+/// `NumericsError::Cancelled`, and the errors of [`Hyperparameters::kernel_on`].
 pub(super) fn descend(
     evaluator: &mut Evaluator<'_>,
     space: &Space,
     start: &[f64],
     max_evaluations: usize,
     observer: &dyn Observer,
-) -> Result<(Option<Found>, usize), NumericsError> {
+) -> Result<(Option<Found>, usize)> {
     let mut walk = Walk::new(evaluator, space, observer);
     if walk.merit(start)?.is_none() {
         return Ok((None, walk.evaluations));
@@ -92,7 +92,7 @@ pub(super) fn finish(
     from: Found,
     max_evaluations: usize,
     observer: &dyn Observer,
-) -> Result<(Found, usize), NumericsError> {
+) -> Result<(Found, usize)> {
     let (bounds, start) = (space.bounds(), from.logarithms.clone());
     let mut walk = Walk::new(evaluator, space, observer);
     let mut merit = walk.merit(&start)?.unwrap_or(f64::NEG_INFINITY);
@@ -122,12 +122,7 @@ pub(super) fn finish(
 /// Returns a unit for each logarithm, `1/√|h|`, in which the curvature at an optimum is 1. The curvature h
 /// comes from differences of slopes. Its magnitude is at least that of the slope, for numbers that tend to
 /// infinity.
-fn units(
-    walk: &mut Walk<'_, '_>,
-    at: &[f64],
-    slopes: &[f64],
-    bounds: &[(f64, f64)],
-) -> Result<Vec<f64>, NumericsError> {
+fn units(walk: &mut Walk<'_, '_>, at: &[f64], slopes: &[f64], bounds: &[(f64, f64)]) -> Result<Vec<f64>> {
     let mut units = Vec::with_capacity(at.len());
     for (k, &(min, max)) in bounds.iter().enumerate() {
         let mut probe = at.to_vec();
@@ -149,7 +144,7 @@ fn run<'a, 'b>(
     bounds: &[(f64, f64)],
     max_evaluations: usize,
     least_gain: f64,
-) -> Result<Walk<'a, 'b>, NumericsError> {
+) -> Result<Walk<'a, 'b>> {
     if from.is_empty() || max_evaluations == 0 {
         return Ok(walk);
     }

@@ -6,7 +6,7 @@ mod walk;
 
 use rayon::prelude::*;
 
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::kernel::Family;
 use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
@@ -82,7 +82,7 @@ pub struct Selected {
 /// [`NumericsError::MeanNotDetermined`], for leave-one-out also if the mean is not determined without one of
 /// the points. [`NumericsError::NotPositiveDefinite`] if the matrix is not positive definite at any start.
 /// [`NumericsError::Cancelled`], and the errors of [`Hyperparameters::kernel_on`].
-pub fn select(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Selected, NumericsError> {
+pub fn select(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Selected> {
     let Selection { cloud, vary, start, .. } = *selection;
     let subject = Subject::of(cloud, selection.values, selection.mean)?;
     start.noise.check_matches(cloud)?;
@@ -106,7 +106,7 @@ pub fn select(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Sele
 }
 
 /// Refuses a varying ε unless one of the families has it.
-fn check_epsilon(families: &[Family], vary: &[Variation]) -> Result<(), NumericsError> {
+fn check_epsilon(families: &[Family], vary: &[Variation]) -> Result<()> {
     let has_epsilon = families.iter().any(|family| matches!(family, Family::Laplace { .. }));
     match vary.iter().position(|variation| variation.parameter == Parameter::Epsilon) {
         Some(entry) if !has_epsilon => {
@@ -153,7 +153,7 @@ fn run_all(
     selection: &Selection<'_>,
     jobs: &[(&Space, Vec<f64>)],
     observer: &dyn Observer,
-) -> Result<Vec<(Option<Found>, usize)>, NumericsError> {
+) -> Result<Vec<(Option<Found>, usize)>> {
     let is_alone = jobs.len() > 1 && subject.n_points() <= SIDE_BY_SIDE;
     let evaluator = || Evaluator::new(subject, selection.criterion, is_alone);
     let job = |evaluator: &mut Evaluator<'_>, (space, start): &(&Space, Vec<f64>)| {
@@ -174,7 +174,7 @@ fn best_of(
     spaces: &[Space],
     ended: Vec<(Option<Found>, usize)>,
     observer: &dyn Observer,
-) -> Result<Selected, NumericsError> {
+) -> Result<Selected> {
     let mut evaluations: usize = ended.iter().map(|(_, evaluations)| evaluations).sum();
     let per_family = ended.len() / spaces.len();
     let mut scores = vec![None; spaces.len()];

@@ -1,6 +1,6 @@
 //! The objective that an optimizer sees.
 
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::observer::Observer;
 use crate::selection::evaluation::space::Space;
 use crate::selection::evaluation::{Evaluator, State};
@@ -65,7 +65,7 @@ impl<'a, 'b> Walk<'a, 'b> {
         }
     }
 
-    fn evaluate(&mut self, x: &[f64], gradient: Option<&mut [f64]>) -> Result<f64, NumericsError> {
+    fn evaluate(&mut self, x: &[f64], gradient: Option<&mut [f64]>) -> Result<f64> {
         let mut slopes = vec![0.0; x.len()];
         let mut value = 0.0;
         if self.error.is_none() {
@@ -85,7 +85,7 @@ impl<'a, 'b> Walk<'a, 'b> {
     }
 
     /// Returns the merit at a point, or `None` if no solver serves it.
-    pub(super) fn merit(&mut self, x: &[f64]) -> Result<Option<f64>, NumericsError> {
+    pub(super) fn merit(&mut self, x: &[f64]) -> Result<Option<f64>> {
         if self.at.as_ref().is_none_or(|at| at.logarithms != x) {
             self.observer.checkpoint()?;
             let hyperparameters = self.space.at(x);
@@ -104,7 +104,7 @@ impl<'a, 'b> Walk<'a, 'b> {
     }
 
     /// Returns the slopes of the merit at a point.
-    pub(super) fn slopes(&mut self, x: &[f64]) -> Result<Vec<f64>, NumericsError> {
+    pub(super) fn slopes(&mut self, x: &[f64]) -> Result<Vec<f64>> {
         self.merit(x)?;
         let (criterion, n) = (self.evaluator.criterion(), self.evaluator.n_points());
         let Some(Point { hyperparameters, state: Some(state), gradient, .. }) = &mut self.at else {
@@ -126,7 +126,7 @@ impl<'a, 'b> Walk<'a, 'b> {
 
     /// Returns the best point with its score and the slopes of score and merit, or `None` if there is none.
     /// Leaves the evaluator there.
-    pub(super) fn end(mut self, start: &[f64]) -> Result<Option<Best>, NumericsError> {
+    pub(super) fn end(mut self, start: &[f64]) -> Result<Option<Best>> {
         let logarithms = self.best_logarithms(start);
         let slopes = self.slopes(&logarithms)?;
         let Some(Point { hyperparameters, state: Some(state), gradient, .. }) = self.at else {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::cholesky::Cholesky;
 use super::{Dense, Factorization};
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::machine::pages::SpareBuffer;
 use crate::solver::system::System;
 
@@ -30,8 +30,8 @@ impl FactorBuilder {
     /// Allocates memory for the factor of n points.
     ///
     /// # Errors
-    /// [`NumericsError::OutOfMemory`].
-    pub fn new(spare: &Arc<SpareBuffer>, n_points: usize) -> Result<Self, NumericsError> {
+    /// `NumericsError::OutOfMemory`.
+    pub fn new(spare: &Arc<SpareBuffer>, n_points: usize) -> Result<Self> {
         Ok(Self { factor: Cholesky::blank(spare, n_points)?, n_filled: 0 })
     }
 

@@ -16,7 +16,7 @@ use faer::{Mat, MatMut, Par};
 use super::condition::estimate_norm1;
 use super::solution::MAX_RELATIVE_RESIDUAL;
 use super::system::System;
-use crate::error::{NotDefinite, NumericsError};
+use crate::error::{NotDefinite, NumericsError, Result};
 use crate::machine::heap::{arc_payload, block_bytes, vec_bytes};
 use crate::machine::pages::SpareBuffer;
 use crate::observer::{Observer, Stage};
@@ -92,7 +92,7 @@ impl Dense {
         workspace: Workspace<'_>,
         system: System,
         observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    ) -> Result<Self> {
         let (cloud, kernel, regularization) = (system.cloud(), system.kernel(), system.regularization());
         observer.enter(Stage::Gram);
         let gram = Cholesky::assemble(workspace.spare, cloud, kernel, regularization, observer)?;
@@ -193,7 +193,7 @@ impl Dense {
         &self,
         mut columns: MatMut<'_, f64>,
         observer: &dyn Observer,
-    ) -> Result<(), NumericsError> {
+    ) -> Result<()> {
         let (n, cholesky) = (self.system.n_points(), self.cholesky()?);
         for (first, count) in pieces(columns.ncols(), (n * n) as f64) {
             observer.checkpoint()?;
@@ -206,7 +206,7 @@ impl Dense {
     ///
     /// # Errors
     /// [`NumericsError::NotPositiveDefinite`] if there is no Cholesky factor.
-    pub(super) fn inverse_diagonal(&self) -> Result<Vec<f64>, NumericsError> {
+    pub(super) fn inverse_diagonal(&self) -> Result<Vec<f64>> {
         let n = self.system.n_points();
         let mut inverse = Mat::<f64>::identity(n, n);
         // On one thread: the caller is one of many tasks, and a thread that waits would begin another task of
@@ -219,14 +219,14 @@ impl Dense {
     ///
     /// # Errors
     /// [`NumericsError::NotPositiveDefinite`] if there is no Cholesky factor.
-    pub(super) fn log_determinant(&self) -> Result<f64, NumericsError> {
+    pub(super) fn log_determinant(&self) -> Result<f64> {
         Ok(self.cholesky()?.log_determinant())
     }
 
     /// Returns the Cholesky factor, unless the matrix is singular to rounding. A factor of such a matrix
     /// exists by luck. It still solves smooth right-hand sides, but its variances and determinants are off by
     /// tens of percent.
-    fn cholesky(&self) -> Result<&Cholesky, NumericsError> {
+    fn cholesky(&self) -> Result<&Cholesky> {
         match &self.factorization {
             Factorization::Cholesky(_) if self.reciprocal_condition < f64::EPSILON => {
                 let reciprocal_condition = self.reciprocal_condition;

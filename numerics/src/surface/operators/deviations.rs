@@ -11,7 +11,7 @@
 
 use super::super::geometry::Geometry;
 use super::{Operator, regular};
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::function::COLUMNS_AT_ONCE;
 use crate::function::functionals::{JetFunctional, ScaledFit, deviations, has_variance};
 use crate::function::interpolant::Interpolant;
@@ -36,7 +36,7 @@ impl Operator {
         factor: f64,
         queries: &Cloud,
         observer: &dyn Observer,
-    ) -> Result<Vec<f64>, NumericsError> {
+    ) -> Result<Vec<f64>> {
         let mut total = Applied { geometry, interpolant, factor, queries }.of_function(self, observer)?;
         if geometry.deviations().is_some() {
             self.add_surface(geometry, &interpolant.at(queries, self.order(), observer)?, &mut total);
@@ -100,7 +100,7 @@ pub(super) struct Applied<'a> {
 
 impl Applied<'_> {
     /// Computes the deviations that come from the function alone: `[m]` or `[m, d]`.
-    fn of_function(&self, operator: Operator, observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
+    fn of_function(&self, operator: Operator, observer: &dyn Observer) -> Result<Vec<f64>> {
         let Interpolant { solver, solution } = self.interpolant;
         let fit = ScaledFit { solver, solution, factor: self.factor };
         let order = operator.order().degree();

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 
 use super::curvature::tangential_trace;
 use super::geometry::Geometry;
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::function::interpolant::Interpolant;
 use crate::kernel::{Kernel, Pairs};
 use crate::machine::registers::{BLOCK, Block, Pack};
@@ -74,7 +74,7 @@ impl Operator {
         interpolant: &Interpolant,
         queries: &Cloud,
         observer: &dyn Observer,
-    ) -> Result<Vec<f64>, NumericsError> {
+    ) -> Result<Vec<f64>> {
         Ok(self.of_jets(geometry, &interpolant.at(queries, self.order(), observer)?))
     }
 
@@ -99,7 +99,7 @@ impl Operator {
         queries: &Cloud,
         mean: Mean,
         observer: &dyn Observer,
-    ) -> Result<Vec<f64>, NumericsError> {
+    ) -> Result<Vec<f64>> {
         with_mean(operator_matrix(geometry, solver, queries, self, observer)?, geometry, solver, mean, self)
     }
 }
@@ -142,7 +142,7 @@ fn operator_matrix(
     queries: &Cloud,
     operator: Operator,
     observer: &dyn Observer,
-) -> Result<Vec<f64>, NumericsError> {
+) -> Result<Vec<f64>> {
     let (cloud, kernel) = (solver.cloud(), solver.kernel());
     cloud.check_same_dimension(queries)?;
     check_smooth_at(cloud, kernel, queries)?;
@@ -196,7 +196,7 @@ fn with_mean(
     solver: &Solver,
     mean: Mean,
     operator: Operator,
-) -> Result<Vec<f64>, NumericsError> {
+) -> Result<Vec<f64>> {
     if mean == Mean::Zero {
         return Ok(matrix);
     }

@@ -13,7 +13,7 @@ use std::sync::{Arc, OnceLock};
 use super::NearNormals;
 use super::degeneracy::is_too_rough;
 use super::orientation::{Oriented, Sampled, SurfaceOrientation};
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::function::interpolant::Interpolant;
 use crate::machine::heap::{arc_payload, block_bytes, vec_bytes};
 use crate::machine::vector::dot;
@@ -55,11 +55,7 @@ impl SignatureSurface {
     /// # Errors
     /// [`NumericsError::DimensionTooSmall`] for d = 1, [`NumericsError::Overflow`],
     /// [`NumericsError::Cancelled`].
-    pub fn of(
-        signature: Interpolant,
-        given: Option<&Cloud>,
-        observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    pub fn of(signature: Interpolant, given: Option<&Cloud>, observer: &dyn Observer) -> Result<Self> {
         let sampling = Arc::new(Sampling::of(signature.solver.cloud(), observer)?);
         Self::over(sampling, Signature::of(signature, observer)?, given, observer)
     }
@@ -73,7 +69,7 @@ impl SignatureSurface {
         signature: Signature,
         given: Option<&Cloud>,
         observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    ) -> Result<Self> {
         let solver = signature.function().solver.clone();
         let cloud = solver.cloud();
         if cloud.dimension() < 2 {
@@ -159,7 +155,7 @@ impl SignatureSurface {
     ///
     /// # Errors
     /// Returns the errors of [`Patches::of`].
-    fn patches(&self, observer: &dyn Observer) -> Result<Arc<Patches>, NumericsError> {
+    fn patches(&self, observer: &dyn Observer) -> Result<Arc<Patches>> {
         if let Some(patches) = self.patches.get() {
             return Ok(patches.clone());
         }

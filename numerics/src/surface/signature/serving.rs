@@ -9,7 +9,7 @@ use super::confirmation::Unconfirmed;
 use super::deviations::deviations;
 use super::doubt::{is_doubtful, uncertain};
 use super::offset::{OffsetJet, offset_jet_at};
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::machine::small::Small;
 use crate::machine::vector::norm;
 use crate::observer::{Observer, Stage};
@@ -37,7 +37,7 @@ pub(crate) fn serve(
     queries: &Cloud,
     request: &GeometryRequest,
     observer: &dyn Observer,
-) -> Result<Served, NumericsError> {
+) -> Result<Served> {
     let order = match request.model {
         SurfaceModel::Offset => JetOrder::Value,
         SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Local => JetOrder::Hessian,
@@ -79,7 +79,7 @@ impl Surroundings {
         are_points: bool,
         checks_curvatures: bool,
         observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    ) -> Result<Self> {
         let (cloud, neighbours) = (surface.cloud(), surface.sampling().neighbours());
         if are_points {
             return Ok(Self::OfPoints);
@@ -129,14 +129,13 @@ impl Slot<'_> {
 }
 
 impl Service<'_> {
-    fn serve(&self, observer: &dyn Observer) -> Result<Served, NumericsError> {
+    fn serve(&self, observer: &dyn Observer) -> Result<Served> {
         let (m, d) = (self.queries.n_points(), self.queries.dimension());
         let look = |query| {
             observer.checkpoint()?;
             Ok(self.needs_offset(query, &self.site(query)))
         };
-        let needs_offset: Vec<bool> =
-            (0..m).into_par_iter().map(look).collect::<Result<_, NumericsError>>()?;
+        let needs_offset: Vec<bool> = (0..m).into_par_iter().map(look).collect::<Result<_>>()?;
         let first_unaffordable =
             (0..m).filter(|&query| needs_offset[query]).nth(self.request.max_offsets).unwrap_or(m);
         let (mut gradients, mut hessians) = (vec![0.0; m * d], vec![0.0; m * d * d]);
@@ -168,7 +167,7 @@ impl Service<'_> {
     }
 
     /// Flags the normals of which too little is known.
-    fn flag_normals(&self, served: &mut Served, observer: &dyn Observer) -> Result<(), NumericsError> {
+    fn flag_normals(&self, served: &mut Served, observer: &dyn Observer) -> Result<()> {
         let quadric = |query: usize| self.site(query).quadric;
         let is_doubtful = |&query: &usize| {
             served.verdict(query).reason.is_none() && is_doubtful(served.gradient(query), quadric(query))
