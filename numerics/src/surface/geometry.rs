@@ -137,12 +137,12 @@ impl Geometry {
 
     /// Standard deviations, if they were asked for.
     pub fn deviations(&self) -> Option<&Deviations> {
-        self.served.deviations()
+        self.served.deviations.as_ref()
     }
 
     /// Values of u at the queries, `[m]`: 1 on the surface at α = 0.
     pub fn levels(&self) -> &[f64] {
-        self.served.levels()
+        &self.served.levels
     }
 
     /// Gradient norm |∇u| of the function that serves each query, `[m]`. Unit 1/L for the signature function,

@@ -72,7 +72,7 @@ impl Surface {
     /// Neighbour search among the points of the surface.
     pub fn neighbours(&self) -> &Neighbours {
         match self {
-            Self::Signature(surface) => surface.sampling().neighbours(),
+            Self::Signature(surface) => surface.sampling.neighbours(),
             Self::Local(surface) => surface.sampling().neighbours(),
         }
     }
