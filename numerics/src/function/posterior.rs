@@ -15,7 +15,7 @@ use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
 use crate::solver::trend::Trend;
 use crate::solver::{Solution, Solver};
-use crate::sums::gram::{fill_cross_gram, fill_lower_gram};
+use crate::sums::gram::{fill_cross_gram, fill_lower_gram, mirror};
 use crate::sums::nodes::Nodes;
 use crate::sums::regularization::Regularization;
 
@@ -182,11 +182,7 @@ pub fn covariance_with_mean(
     if let Some(trend) = trend {
         add_mean(&mut covariance, &MeanVariance::of(solver, trend)?, queries, v);
     }
-    for j in 0..m {
-        for i in 0..j {
-            covariance[j * m + i] = covariance[i * m + j];
-        }
-    }
+    mirror(&mut covariance, m);
     Ok(Covariance { latent: covariance, clamped })
 }
 

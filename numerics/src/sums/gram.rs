@@ -42,6 +42,15 @@ pub(crate) fn fill_lower_gram(
     })
 }
 
+/// Copies the lower triangle of `[n, n]` to the upper one.
+pub(crate) fn mirror(matrix: &mut [f64], n: usize) {
+    for j in 0..n {
+        for i in 0..j {
+            matrix[j * n + i] = matrix[i * n + j];
+        }
+    }
+}
+
 /// Writes `out[i − points.start] = k(x_i, x)` for a range of points.
 pub(crate) fn fill_kernel_column(
     nodes: &Nodes,

@@ -13,7 +13,7 @@ use crate::machine::vector::dot;
 use crate::observer::{Observer, Stage};
 use crate::selection::learning::remove_mean;
 use crate::selection::subject::Subject;
-use crate::sums::gram::fill_lower_gram;
+use crate::sums::gram::{fill_lower_gram, mirror};
 use crate::sums::regularization::Regularization;
 
 /// Least `D_i + α` that is significant, as a multiple of the greatest eigenvalue. Eigenvalues have about this
@@ -99,15 +99,6 @@ fn decompose(matrix: &[f64], n: usize) -> Result<(Vec<f64>, Vec<f64>)> {
         eigenvalues.fill(f64::NAN);
     }
     Ok((eigenvalues, vectors))
-}
-
-/// Copies the lower triangle to the upper one.
-fn mirror(matrix: &mut [f64], n: usize) {
-    for j in 0..n {
-        for i in 0..j {
-            matrix[j * n + i] = matrix[i * n + j];
-        }
-    }
 }
 
 /// Sets the functions of the mean apart: `K ← (I − F̂F̂ᵀ)K(I − F̂F̂ᵀ) − sF̂F̂ᵀ`.

@@ -151,22 +151,22 @@ fn search(all: &Evidence<'_>, order: &Order, observer: &dyn Observer) -> Result<
     let (values, grid) = (all.values, Grid::of(all.values));
     let deep = Evidence::of(values, &order.deep);
     let mut agreement = Agreement {
-        all: Search::new(all, &grid),
-        deep: (!order.deep.is_empty()).then(|| Search::new(&deep, &grid)),
+        all: Search::new(all, &grid, observer),
+        deep: (!order.deep.is_empty()).then(|| Search::new(&deep, &grid, observer)),
         grid: &grid,
         unit: values.unit,
     };
     let best = match order.searched.as_slice() {
         [first, _, ..] => {
             let sample = Evidence::of(values, std::slice::from_ref(first));
-            let mut on_sample = Search::new(&sample, &grid);
-            let Some(best) = on_sample.best(observer)? else { return Ok(None) };
-            let Some(begin) = on_sample.least_of(best.into_iter(), observer)? else { return Ok(None) };
-            Some(agreement.all.best_from(begin, observer)?)
+            let mut on_sample = Search::new(&sample, &grid, observer);
+            let Some(best) = on_sample.best()? else { return Ok(None) };
+            let Some(begin) = on_sample.least_of(best.into_iter())? else { return Ok(None) };
+            Some(agreement.all.best_from(begin)?)
         }
-        _ => agreement.all.best(observer)?,
+        _ => agreement.all.best()?,
     };
-    best.map_or(Ok(None), |best| agreement.decided(best, observer))
+    best.map_or(Ok(None), |best| agreement.decided(best))
 }
 
 /// Finds the mean of values under a given kernel and noise.

@@ -17,7 +17,8 @@ use crate::selection::parameters::{Hyperparameters, Parameter, Variation};
 use crate::selection::subject::Subject;
 use crate::solver::trend::{Mean, Trend};
 pub use descent::Side;
-use descent::{Found, descend, finish, side};
+use descent::{descend, finish, side};
+use walk::Found;
 
 /// Usual limit of evaluations of one descent.
 pub const MAX_EVALUATIONS: usize = 200;
