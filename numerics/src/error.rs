@@ -1,5 +1,8 @@
 //! The error type of the numerical layer, with its messages.
 
+/// The result of a computation that may be refused.
+pub type Result<T, E = NumericsError> = std::result::Result<T, E>;
+
 /// A refusal of the numerics, named by its cause, with the index of the offending point if there is one.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NumericsError {

@@ -1,6 +1,6 @@
 //! Progress reports to the caller of a computation, and cancellation when nobody waits for it any more.
 
-use super::error::NumericsError;
+use super::error::{NumericsError, Result};
 
 /// The stages of an answer, in order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,7 +32,7 @@ pub trait Observer: Sync {
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`] once the caller is gone.
-    fn checkpoint(&self) -> Result<(), NumericsError> {
+    fn checkpoint(&self) -> Result<()> {
         if self.is_cancelled() { Err(NumericsError::Cancelled) } else { Ok(()) }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::function::interpolant::Interpolant;
 use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
@@ -34,12 +34,7 @@ impl Batch {
     ///
     /// # Errors
     /// Returns the errors of [`Solution::of_each`].
-    pub fn fit(
-        solver: Arc<Solver>,
-        values: &[f64],
-        mean: Mean,
-        observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    pub fn fit(solver: Arc<Solver>, values: &[f64], mean: Mean, observer: &dyn Observer) -> Result<Self> {
         let solutions = Solution::of_each(&solver, values, mean, observer)?;
         Ok(Self { solver, solutions: solutions.into_iter().map(Arc::new).collect() })
     }
@@ -57,12 +52,7 @@ impl Batch {
     ///
     /// # Errors
     /// Returns the errors of [`Interpolant::at`].
-    pub fn at(
-        &self,
-        queries: &Cloud,
-        order: JetOrder,
-        observer: &dyn Observer,
-    ) -> Result<BatchJets, NumericsError> {
+    pub fn at(&self, queries: &Cloud, order: JetOrder, observer: &dyn Observer) -> Result<BatchJets> {
         if order == JetOrder::Value {
             return Ok(BatchJets { values: self.values_at(queries, observer)?, ..BatchJets::default() });
         }
@@ -78,7 +68,7 @@ impl Batch {
         Ok(found)
     }
 
-    fn values_at(&self, queries: &Cloud, observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
+    fn values_at(&self, queries: &Cloud, observer: &dyn Observer) -> Result<Vec<f64>> {
         self.solver.cloud().check_same_dimension(queries)?;
         observer.enter(Stage::Evaluate);
         let expansion = self.solver.expansion(&[]);
@@ -96,6 +86,7 @@ impl Batch {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::NumericsError;
     use crate::kernel::Kernel;
     use crate::observer::Unobserved;
     use crate::solver::System;

@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use super::COLUMNS_AT_ONCE;
-use super::functionals::{JetFunctional, deviations, has_variance};
+use super::functionals::{JetFunctional, ScaledFit, deviations, has_variance};
 use super::interpolant::Interpolant;
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 
@@ -39,9 +39,9 @@ impl JetDeviations {
         queries: &Cloud,
         order: usize,
         observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
-        let (solver, solution) = (&*interpolant.solver, &*interpolant.solution);
-        if !has_variance(solver.kernel(), order) {
+    ) -> Result<Self> {
+        let fit = ScaledFit { solver: &interpolant.solver, solution: &interpolant.solution, factor };
+        if !has_variance(fit.solver.kernel(), order) {
             return Err(NumericsError::DerivativesVary { order });
         }
         let (m, d) = (queries.n_points(), queries.dimension());
@@ -50,7 +50,7 @@ impl JetDeviations {
         let (mut all, mut clamped) = (Vec::with_capacity(m * width), Vec::new());
         for first in (0..m).step_by(per_block) {
             let functionals = functionals(first..(first + per_block).min(m), d, order);
-            let found = deviations((solver, solution, factor), queries, &functionals, observer)?;
+            let found = deviations(fit, queries, &functionals, observer)?;
             clamped.extend(found.clamped.iter().map(|at| functionals[*at].query));
             all.extend(found.found);
         }
@@ -107,7 +107,7 @@ fn functionals(queries: Range<usize>, d: usize, order: usize) -> Vec<JetFunction
         }
         if order >= 2 {
             let pairs = (0..d).flat_map(|a| (a..d).map(move |b| (a, b)));
-            functionals.extend(pairs.map(|pair| JetFunctional::second_derivative(query, d, pair)));
+            functionals.extend(pairs.map(|(a, b)| JetFunctional::second_derivative(query, d, a, b)));
         }
     }
     functionals

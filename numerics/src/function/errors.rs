@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::functionals::{Covariant, JetFunctional};
 use super::interpolant::Interpolant;
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::kernel::Kernel;
 use crate::machine::vector::dot;
 use crate::observer::{Observer, Stage};
@@ -46,7 +46,7 @@ pub(crate) fn errors_under(
     queries: &Cloud,
     functionals: &[JetFunctional],
     observer: &dyn Observer,
-) -> Result<Vec<f64>, NumericsError> {
+) -> Result<Vec<f64>> {
     let mut found = Vec::with_capacity(functionals.len());
     for block in functionals.chunks(JUDGED_AT_ONCE) {
         // Normalised so that squares do not overflow.
@@ -65,7 +65,7 @@ fn errors_of_block(
     queries: &Cloud,
     functionals: &[JetFunctional],
     observer: &dyn Observer,
-) -> Result<Vec<f64>, NumericsError> {
+) -> Result<Vec<f64>> {
     let (solver, n) = (&interpolant.solver, interpolant.solver.n_points());
     let cloud = solver.cloud();
     observer.checkpoint()?;
@@ -105,7 +105,7 @@ fn weights_on_values(
     interpolant: &Interpolant,
     queries: &Cloud,
     functionals: &[JetFunctional],
-) -> Result<Vec<f64>, NumericsError> {
+) -> Result<Vec<f64>> {
     let (solver, n) = (&interpolant.solver, interpolant.solver.n_points());
     let mut weights = vec![0.0; n * functionals.len()];
     Covariant::of(solver.cloud(), solver.kernel()).fill(functionals, queries, &mut weights);
@@ -125,7 +125,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::function::functionals::{deviations, has_variance};
+    use crate::function::functionals::{ScaledFit, deviations, has_variance};
     use crate::observer::Unobserved;
     use crate::solver::trend::Mean;
     use crate::solver::{Solver, System};
@@ -144,7 +144,7 @@ mod tests {
     fn functionals() -> (Cloud, Vec<JetFunctional>) {
         let queries = Cloud::new(vec![0.3, 0.8, 0.5, 0.0, 0.0, 1.1], 3).unwrap();
         let of = |query| {
-            let bend = JetFunctional::second_derivative(query, 3, (0, 1));
+            let bend = JetFunctional::second_derivative(query, 3, 0, 1);
             [JetFunctional::value(query, 3), JetFunctional::derivative(query, &[0.6, 0.0, -0.8]), bend]
         };
         (queries, [of(0), of(1)].concat())
@@ -164,8 +164,8 @@ mod tests {
                 let process =
                     Process { kernel: &kernel, noise: ALPHA, factor: 1.0, trend: u.solution.trend.as_ref() };
                 let found = errors_under(&process, &u, &queries, &functionals, &Unobserved).unwrap();
-                let of = (&*u.solver, &*u.solution, 1.0);
-                let expected = deviations(of, &queries, &functionals, &Unobserved).unwrap().found;
+                let fit = ScaledFit { solver: &u.solver, solution: &u.solution, factor: 1.0 };
+                let expected = deviations(fit, &queries, &functionals, &Unobserved).unwrap().found;
                 for ((a, b), functional) in found.iter().zip(&expected).zip(&functionals) {
                     // Terms as large as the prior variance cancel, up to rounding.
                     let prior = functional.prior_variance(&kernel);

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::COLUMNS_AT_ONCE;
 use super::mean_variance::MeanVariance;
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::kernel::{Kernel, Pairs};
 use crate::machine::registers::{BLOCK, Block, Pack};
 use crate::machine::small::{Small, zeros};
@@ -20,7 +20,7 @@ use crate::points::cloud::Cloud;
 use crate::solver::trend::{Basis, Trend};
 use crate::solver::{Solution, Solver};
 use crate::sums::jets::check_smooth_at;
-use crate::sums::nodes::Nodes;
+use crate::sums::nodes::{Nodes, PackPlace};
 
 /// The functional `c u + g·∇u + A : D²u` at a query.
 #[derive(Debug, Clone)]
@@ -46,7 +46,7 @@ impl JetFunctional {
     }
 
     /// Returns entry (a, b) of the Hessian as a functional.
-    pub(crate) fn second_derivative(query: usize, dimension: usize, (a, b): (usize, usize)) -> Self {
+    pub(crate) fn second_derivative(query: usize, dimension: usize, a: usize, b: usize) -> Self {
         let mut of_hessian = zeros(dimension * dimension);
         of_hessian[a * dimension + b] += 0.5;
         of_hessian[b * dimension + a] += 0.5;
@@ -177,6 +177,14 @@ pub(crate) fn has_variance(kernel: &Kernel, order: usize) -> bool {
     }
 }
 
+/// A fitted function whose kernel and noise are `factor` times those of the solver.
+#[derive(Clone, Copy)]
+pub(crate) struct ScaledFit<'a> {
+    pub(crate) solver: &'a Solver,
+    pub(crate) solution: &'a Solution,
+    pub(crate) factor: f64,
+}
+
 /// Standard deviations of functionals.
 pub(crate) struct Deviations {
     /// `[functionals]`
@@ -187,8 +195,6 @@ pub(crate) struct Deviations {
 
 /// Returns the posterior standard deviations of functionals given the values at the points.
 ///
-/// Kernel and noise are `factor` times those of the solver.
-///
 /// # Errors
 /// - [`NumericsError::DimensionMismatch`].
 /// - [`NumericsError::KernelNotSmooth`] for derivatives at points of the cloud.
@@ -196,11 +202,12 @@ pub(crate) struct Deviations {
 /// - [`NumericsError::Overflow`] if a deviation is not finite.
 /// - [`NumericsError::Cancelled`].
 pub(crate) fn deviations(
-    (solver, solution, factor): (&Solver, &Solution, f64),
+    fit: ScaledFit<'_>,
     queries: &Cloud,
     functionals: &[JetFunctional],
     observer: &dyn Observer,
-) -> Result<Deviations, NumericsError> {
+) -> Result<Deviations> {
+    let ScaledFit { solver, solution, factor } = fit;
     let (n, kernel) = (solver.n_points(), solver.kernel());
     solver.cloud().check_same_dimension(queries)?;
     if functionals.iter().any(JetFunctional::has_derivatives) {
@@ -330,11 +337,17 @@ impl<S: Simd> Pairs<S> for CovariancePairs<'_, '_, S> {
         let mut along = zero;
         let inverse = 1.0 / kernel.length_scale();
         let differences = &mut *self.differences;
-        let q = nodes.scaled_distances(self.simd, (self.block, at), x, kernel, |c, difference| {
-            let difference = difference * inverse;
-            along = difference.mul_add(Pack::splat(self.simd, functional.of_gradient[c]), along);
-            difference.store(&mut differences[c], at);
-        });
+        let q = nodes.scaled_distances(
+            self.simd,
+            PackPlace { block: self.block, at },
+            x,
+            kernel,
+            |c, difference| {
+                let difference = difference * inverse;
+                along = difference.mul_add(Pack::splat(self.simd, functional.of_gradient[c]), along);
+                difference.store(&mut differences[c], at);
+            },
+        );
         let mut form = zero;
         for FormTerm { a, b, factor } in terms {
             let other = Pack::load(self.simd, &self.differences[*b], at) * *factor;

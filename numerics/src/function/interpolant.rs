@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
 use crate::solver::trend::Mean;
@@ -23,7 +23,7 @@ impl Interpolant {
     ///
     /// # Errors
     /// Returns the errors of [`Solution::of`].
-    pub fn fit(solver: Arc<Solver>, values: &[f64], observer: &dyn Observer) -> Result<Self, NumericsError> {
+    pub fn fit(solver: Arc<Solver>, values: &[f64], observer: &dyn Observer) -> Result<Self> {
         let solution = Arc::new(Solution::of(&solver, values, observer)?);
         Ok(Self { solver, solution })
     }
@@ -37,7 +37,7 @@ impl Interpolant {
         values: &[f64],
         mean: Mean,
         observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    ) -> Result<Self> {
         let solution = Arc::new(Solution::with_mean(&solver, values, mean, observer)?);
         Ok(Self { solver, solution })
     }
@@ -49,7 +49,7 @@ impl Interpolant {
     ///
     /// # Errors
     /// Returns the errors of [`Solution::of`].
-    pub fn signature(solver: Arc<Solver>, observer: &dyn Observer) -> Result<Self, NumericsError> {
+    pub fn signature(solver: Arc<Solver>, observer: &dyn Observer) -> Result<Self> {
         let ones = vec![1.0; solver.n_points()];
         Self::fit(solver, &ones, observer)
     }
@@ -57,16 +57,11 @@ impl Interpolant {
     /// Evaluates the function and its derivatives up to `order` at queries `[m, d]`.
     ///
     /// # Errors
-    /// - [`NumericsError::DimensionMismatch`].
-    /// - [`NumericsError::KernelNotSmooth`] if derivatives are asked for at a point of the cloud and the
+    /// - `NumericsError::DimensionMismatch`.
+    /// - `NumericsError::KernelNotSmooth` if derivatives are asked for at a point of the cloud and the
     ///   kernel has a kink there.
-    /// - [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
-    pub fn at(
-        &self,
-        queries: &Cloud,
-        order: JetOrder,
-        observer: &dyn Observer,
-    ) -> Result<Jets, NumericsError> {
+    /// - `NumericsError::Overflow`, `NumericsError::Cancelled`.
+    pub fn at(&self, queries: &Cloud, order: JetOrder, observer: &dyn Observer) -> Result<Jets> {
         let (cloud, kernel) = (self.solver.cloud(), self.solver.kernel());
         cloud.check_same_dimension(queries)?;
         if order != JetOrder::Value {

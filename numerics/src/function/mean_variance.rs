@@ -6,7 +6,7 @@
 
 use faer::{Mat, MatMut};
 
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::machine::vector::dot;
 use crate::observer::Unobserved;
 use crate::solver::Solver;
@@ -26,7 +26,7 @@ impl<'a> MeanVariance<'a> {
     /// # Errors
     /// [`NumericsError::NotPositiveDefinite`]
     /// without a Cholesky factor. [`NumericsError::MeanNotDetermined`].
-    pub(super) fn of(solver: &Solver, trend: &'a Trend) -> Result<Self, NumericsError> {
+    pub(super) fn of(solver: &Solver, trend: &'a Trend) -> Result<Self> {
         let (basis, n) = (trend.basis(), solver.n_points());
         let p = basis.n_functions();
         let mut whitened = basis.columns(solver.cloud());

@@ -5,7 +5,7 @@ use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::prelude::ReborrowMut;
 use faer::{Accum, MatMut};
 
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::machine::parallelism::parallelism;
 use crate::observer::Observer;
 
@@ -30,13 +30,8 @@ impl PivotedRoot {
     /// `rank` columns of L are valid.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(super) fn of(
-        matrix: &mut [f64],
-        m: usize,
-        tolerance: f64,
-        observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    /// `NumericsError::Cancelled`.
+    pub(super) fn of(matrix: &mut [f64], m: usize, tolerance: f64, observer: &dyn Observer) -> Result<Self> {
         let mut matrix = MatMut::from_column_major_slice_mut(matrix, m, m);
         let mut order: Vec<usize> = (0..m).collect();
         for first in (0..m).step_by(COLUMNS_PER_BLOCK) {

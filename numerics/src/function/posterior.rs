@@ -9,13 +9,13 @@ use rayon::prelude::*;
 
 use super::COLUMNS_AT_ONCE;
 use super::mean_variance::MeanVariance;
-use crate::error::{NotDefinite, NumericsError};
+use crate::error::{NotDefinite, Result};
 use crate::machine::parallelism::parallelism;
 use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
 use crate::solver::trend::Trend;
 use crate::solver::{Solution, Solver};
-use crate::sums::gram::{fill_cross_gram, fill_lower_gram};
+use crate::sums::gram::{fill_cross_gram, fill_lower_gram, mirror};
 use crate::sums::nodes::Nodes;
 use crate::sums::regularization::Regularization;
 
@@ -79,27 +79,23 @@ impl Covariance {
 /// ```
 ///
 /// # Errors
-/// - [`NumericsError::DimensionMismatch`].
-/// - [`NumericsError::NotPositiveDefinite`] without a Cholesky factor, or if a variance is below −τ.
-/// - [`NumericsError::Cancelled`].
-pub fn variances(
-    solver: &Solver,
-    queries: &Cloud,
-    observer: &dyn Observer,
-) -> Result<Variances, NumericsError> {
+/// - `NumericsError::DimensionMismatch`.
+/// - `NumericsError::NotPositiveDefinite` without a Cholesky factor, or if a variance is below −τ.
+/// - `NumericsError::Cancelled`.
+pub fn variances(solver: &Solver, queries: &Cloud, observer: &dyn Observer) -> Result<Variances> {
     variances_with_mean(solver, None, queries, observer)
 }
 
 /// Returns the [`variances`] of a function with a mean.
 ///
 /// # Errors
-/// Returns the errors of [`variances`], and [`NumericsError::MeanNotDetermined`].
+/// Returns the errors of [`variances`], and `NumericsError::MeanNotDetermined`.
 pub fn variances_with_mean(
     solver: &Solver,
     trend: Option<&Trend>,
     queries: &Cloud,
     observer: &dyn Observer,
-) -> Result<Variances, NumericsError> {
+) -> Result<Variances> {
     let n = solver.n_points();
     solver.cloud().check_same_dimension(queries)?;
     let k0 = solver.kernel().at_zero();
@@ -138,24 +134,20 @@ pub fn variances_with_mean(
 ///
 /// # Errors
 /// Returns the errors of [`variances`].
-pub fn covariance(
-    solver: &Solver,
-    queries: &Cloud,
-    observer: &dyn Observer,
-) -> Result<Covariance, NumericsError> {
+pub fn covariance(solver: &Solver, queries: &Cloud, observer: &dyn Observer) -> Result<Covariance> {
     covariance_with_mean(solver, None, queries, observer)
 }
 
 /// Returns the [`covariance`] of a function with a mean.
 ///
 /// # Errors
-/// Returns the errors of [`variances`], and [`NumericsError::MeanNotDetermined`].
+/// Returns the errors of [`variances`], and `NumericsError::MeanNotDetermined`.
 pub fn covariance_with_mean(
     solver: &Solver,
     trend: Option<&Trend>,
     queries: &Cloud,
     observer: &dyn Observer,
-) -> Result<Covariance, NumericsError> {
+) -> Result<Covariance> {
     let (n, m) = (solver.n_points(), queries.n_points());
     solver.cloud().check_same_dimension(queries)?;
     let nodes = Nodes::of(solver.cloud());
@@ -190,11 +182,7 @@ pub fn covariance_with_mean(
     if let Some(trend) = trend {
         add_mean(&mut covariance, &MeanVariance::of(solver, trend)?, queries, v);
     }
-    for j in 0..m {
-        for i in 0..j {
-            covariance[j * m + i] = covariance[i * m + j];
-        }
-    }
+    mirror(&mut covariance, m);
     Ok(Covariance { latent: covariance, clamped })
 }
 
@@ -217,12 +205,8 @@ fn add_mean(covariance: &mut [f64], mean: &MeanVariance<'_>, queries: &Cloud, v:
 /// the function has a mean, this is the likelihood of the values given that mean.
 ///
 /// # Errors
-/// [`NumericsError::NotPositiveDefinite`] without a Cholesky factor.
-pub fn log_marginal_likelihood(
-    solver: &Solver,
-    solution: &Solution,
-    factor: f64,
-) -> Result<f64, NumericsError> {
+/// `NumericsError::NotPositiveDefinite` without a Cholesky factor.
+pub fn log_marginal_likelihood(solver: &Solver, solution: &Solution, factor: f64) -> Result<f64> {
     let normalization = solver.n_points() as f64 * (2.0 * std::f64::consts::PI * factor).ln();
     Ok(-0.5 * (solution.energy / factor + solver.log_determinant()? + normalization))
 }
@@ -234,7 +218,7 @@ fn whitened_cross_gram(
     queries: &Cloud,
     columns: &mut [f64],
     observer: &dyn Observer,
-) -> Result<(), NumericsError> {
+) -> Result<()> {
     observer.enter(Stage::Evaluate);
     fill_cross_gram(nodes, solver.kernel(), queries, columns, observer)?;
     observer.enter(Stage::Solve);
@@ -250,7 +234,7 @@ fn check_is_rounding(
     x: &[f64],
     variance: f64,
     observer: &dyn Observer,
-) -> Result<(), NumericsError> {
+) -> Result<()> {
     let n = solver.n_points();
     let mut w = vec![0.0; n];
     let at_query = Cloud::new(x.to_vec(), x.len())?;

@@ -5,7 +5,7 @@ use faer::{Accum, MatMut, MatRef};
 
 use super::pivoted_root::PivotedRoot;
 use super::posterior::Covariance;
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::machine::parallelism::parallelism;
 use crate::machine::random::Random;
 use crate::observer::{Observer, Stage};
@@ -31,11 +31,7 @@ impl Root {
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`]. [`NumericsError::WeightsOverflow`] if an entry is not finite.
-    pub fn of(
-        covariance: &Covariance,
-        prior_variance: f64,
-        observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    pub fn of(covariance: &Covariance, prior_variance: f64, observer: &dyn Observer) -> Result<Self> {
         observer.enter(Stage::Solve);
         observer.checkpoint()?;
         let m = covariance.latent.len().isqrt();
@@ -68,7 +64,7 @@ impl Root {
         count: usize,
         (seed, list): (u64, u64),
         observer: &dyn Observer,
-    ) -> Result<Vec<f64>, NumericsError> {
+    ) -> Result<Vec<f64>> {
         let m = self.n_queries;
         let rank = self.directions.len().checked_div(m).unwrap_or(0);
         let mut normals = vec![0.0; rank * count.min(DRAWS_PER_BLOCK)];

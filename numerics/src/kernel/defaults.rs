@@ -3,7 +3,7 @@
 //! Everything scales with the cloud: millimetres and kilometres get the same geometry.
 
 use super::{Family, Kernel};
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::points::sampling::Scales;
 
 /// Purpose of a fit, which decides its default kernel.
@@ -52,12 +52,8 @@ const CURVATURES: SurfaceRule = SurfaceRule { extents: 0.9, spacings: 8.0, smoot
 /// unit L.
 ///
 /// # Errors
-/// [`NumericsError::InvalidKernelParameter`] if the cloud is too small or large for any length scale.
-pub fn default_fit(
-    scales: &Scales,
-    purpose: Purpose,
-    noise: impl FnOnce() -> f64,
-) -> Result<(Kernel, f64), NumericsError> {
+/// `NumericsError::InvalidKernelParameter` if the cloud is too small or large for any length scale.
+pub fn default_fit(scales: &Scales, purpose: Purpose, noise: impl FnOnce() -> f64) -> Result<(Kernel, f64)> {
     let rule = match purpose {
         Purpose::Values => {
             let family = Family::Matern { order: 2 };

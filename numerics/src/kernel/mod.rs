@@ -25,7 +25,7 @@ use std::sync::Arc;
 
 use pulp::Simd;
 
-use super::error::NumericsError;
+use super::error::{NumericsError, Result};
 use super::machine::heap::{arc_payload, block_bytes};
 use super::points::cloud::Cloud;
 use axes::Axes;
@@ -67,7 +67,7 @@ impl Kernel {
     /// [`NumericsError::InvalidKernelParameter`] for a length scale or variance outside 1e-140 to 1e140,
     /// since its square and inverse square must stay inside float64; an epsilon outside 0 to 1e5; an order
     /// above [`MAX_MATERN_ORDER`].
-    pub fn new(family: Family, length_scale: f64, variance: f64) -> Result<Self, NumericsError> {
+    pub fn new(family: Family, length_scale: f64, variance: f64) -> Result<Self> {
         let refuse =
             |parameter, requirement| Err(NumericsError::InvalidKernelParameter { parameter, requirement });
         if !LENGTH_SCALES.contains(&length_scale) {
@@ -88,7 +88,7 @@ impl Kernel {
     /// # Errors
     /// [`NumericsError::InvalidLengthScale`] with the axis; [`NumericsError::InvalidKernelParameter`] for an
     /// empty slice; those of [`Kernel::new`].
-    pub fn of_axes(family: Family, length_scales: &[f64], variance: f64) -> Result<Self, NumericsError> {
+    pub fn of_axes(family: Family, length_scales: &[f64], variance: f64) -> Result<Self> {
         if let Some(axis) =
             length_scales.iter().position(|length_scale| !LENGTH_SCALES.contains(length_scale))
         {
@@ -103,7 +103,7 @@ impl Kernel {
     ///
     /// # Errors
     /// [`NumericsError::InvalidKernelParameter`] for a variance outside 1e-140 to 1e140.
-    pub fn with_variance(&self, variance: f64) -> Result<Self, NumericsError> {
+    pub fn with_variance(&self, variance: f64) -> Result<Self> {
         let Self { variance, .. } = Self::new(self.family, self.length_scale, variance)?;
         Ok(Self { variance, ..self.clone() })
     }
@@ -152,7 +152,7 @@ impl Kernel {
     /// # Errors
     /// [`NumericsError::KernelNotPositiveDefinite`] if the family is not positive definite there;
     /// [`NumericsError::InvalidKernelParameter`] if the number of length scales is not the dimension.
-    pub fn check_dimension(&self, dimension: usize) -> Result<(), NumericsError> {
+    pub fn check_dimension(&self, dimension: usize) -> Result<()> {
         if self.length_scales().is_some_and(|axes| axes.len() != dimension) {
             return Err(AXES_MISMATCH);
         }

@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use memmap2::MmapMut;
 
 use super::heap::vec_bytes;
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 
 /// Size in bytes from which buffers are mapped. The allocator recycles smaller ones by itself, and they would
 /// fill no huge page.
@@ -39,7 +39,7 @@ impl SpareBuffer {
     ///
     /// # Errors
     /// [`NumericsError::OutOfMemory`].
-    pub(crate) fn take(self: &Arc<Self>, n_numbers: usize) -> Result<Buffer, NumericsError> {
+    pub(crate) fn take(self: &Arc<Self>, n_numbers: usize) -> Result<Buffer> {
         let n_bytes = n_numbers.saturating_mul(size_of::<f64>());
         if n_bytes < MAPPED_BYTES {
             return Ok(Buffer { pages: Pages::Heap(vec![0.0; n_numbers]), n_numbers, home: None });
@@ -71,7 +71,7 @@ impl SpareBuffer {
     }
 }
 
-fn map_huge(n_bytes: usize) -> Result<MmapMut, NumericsError> {
+fn map_huge(n_bytes: usize) -> Result<MmapMut> {
     let map = MmapMut::map_anon(n_bytes).map_err(|_| NumericsError::OutOfMemory { n_bytes })?;
     // This is only a hint, so a refusal (a system without huge pages) does no harm.
     #[cfg(target_os = "linux")]

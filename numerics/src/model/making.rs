@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{Model, Recipe};
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::function::local_kriging::LocalKriging;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
@@ -36,8 +36,8 @@ impl Recipe {
     /// Makes the model ready.
     ///
     /// # Errors
-    /// Returns the errors of [`System::new`] and [`Solver::dense_in`], and [`NumericsError::Cancelled`].
-    pub fn make(self, making: Making<'_>, observer: &dyn Observer) -> Result<Model, NumericsError> {
+    /// Returns the errors of [`System::new`] and [`Solver::dense_in`], and `NumericsError::Cancelled`.
+    pub fn make(self, making: Making<'_>, observer: &dyn Observer) -> Result<Model> {
         let Making { cloud, sampling, workspace } = making;
         match self {
             Self::System { kernel, regularization } => {

@@ -15,7 +15,7 @@ mod values;
 
 use std::sync::Arc;
 
-use crate::error::{NumericsError, Quantity, SolverKind};
+use crate::error::{NumericsError, Quantity, Result, SolverKind};
 use crate::function::interpolant::Interpolant;
 use crate::function::local_kriging::LocalKriging;
 use crate::observer::Observer;
@@ -85,7 +85,7 @@ impl Model {
     ///
     /// # Errors
     /// [`NumericsError::Unsupported`] where the model has no such solver.
-    pub fn solver(&self) -> Result<&Arc<Solver>, NumericsError> {
+    pub fn solver(&self) -> Result<&Arc<Solver>> {
         match self {
             Self::System(solver) => Ok(solver),
             Self::LocalKriging(_) | Self::LocalSurface => Err(self.lacks(Quantity::DenseMatrix)),
@@ -113,7 +113,7 @@ impl Model {
         mean: Mean,
         known: Option<Arc<Solution>>,
         observer: &dyn Observer,
-    ) -> Result<Interpolant, NumericsError> {
+    ) -> Result<Interpolant> {
         let solver = self.solver()?.clone();
         match known {
             Some(solution) => Ok(Interpolant { solver, solution }),
@@ -126,11 +126,7 @@ impl Model {
     /// # Errors
     /// Returns the errors of [`SignatureSurface::over`] and [`LocalSurface::of`], and
     /// [`NumericsError::Unsupported`] for local kriging of values.
-    pub fn surface(
-        &self,
-        making: SurfaceMaking<'_>,
-        observer: &dyn Observer,
-    ) -> Result<Surface, NumericsError> {
+    pub fn surface(&self, making: SurfaceMaking<'_>, observer: &dyn Observer) -> Result<Surface> {
         let SurfaceMaking { cloud, sampling, given, signature } = making;
         match self {
             Self::LocalSurface => Ok(LocalSurface::of(cloud.clone(), sampling, given, observer)?.into()),

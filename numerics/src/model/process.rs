@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::kernel::Kernel;
 use crate::kernel::defaults::DEFAULT_ALPHA;
 use crate::selection::Learned;
@@ -27,8 +27,8 @@ impl ScaledProcess {
     /// scaled.
     ///
     /// # Errors
-    /// [`NumericsError::InvalidRegularization`].
-    pub fn of(kernel: Kernel, regularization: Option<Regularization>) -> Result<Self, NumericsError> {
+    /// `NumericsError::InvalidRegularization`.
+    pub fn of(kernel: Kernel, regularization: Option<Regularization>) -> Result<Self> {
         let variance = kernel.variance();
         match given_or(regularization, DEFAULT_ALPHA)? {
             Regularization::Uniform(alpha) if alpha == 0.0 || RATIOS.contains(&(alpha / variance)) => {
@@ -42,8 +42,8 @@ impl ScaledProcess {
     /// Returns the process with a kernel learned from values, and with learned noise where none is given.
     ///
     /// # Errors
-    /// [`NumericsError::InvalidKernelParameter`], [`NumericsError::InvalidRegularization`].
-    pub fn learned(learned: &Learned, given: Option<Regularization>) -> Result<Self, NumericsError> {
+    /// `NumericsError::InvalidKernelParameter`, `NumericsError::InvalidRegularization`.
+    pub fn learned(learned: &Learned, given: Option<Regularization>) -> Result<Self> {
         let Learned { family, length_scale, ratio, variance, .. } = *learned;
         let kernel = |variance| Kernel::new(family, length_scale, variance);
         match given_or(given, ratio * variance)? {
@@ -61,12 +61,12 @@ impl ScaledProcess {
     /// is given.
     ///
     /// # Errors
-    /// [`NumericsError::InvalidRegularization`].
-    pub fn by_rule(kernel: Kernel, alpha: f64, given: Option<Regularization>) -> Result<Self, NumericsError> {
+    /// `NumericsError::InvalidRegularization`.
+    pub fn by_rule(kernel: Kernel, alpha: f64, given: Option<Regularization>) -> Result<Self> {
         Ok(Self { kernel, regularization: given_or(given, alpha)?, scale: 1.0 })
     }
 }
 
-fn given_or(given: Option<Regularization>, alpha: f64) -> Result<Regularization, NumericsError> {
+fn given_or(given: Option<Regularization>, alpha: f64) -> Result<Regularization> {
     given.map_or_else(|| Regularization::uniform(alpha), Ok)
 }

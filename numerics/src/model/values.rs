@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{Model, Report};
-use crate::error::{NumericsError, Quantity};
+use crate::error::{NumericsError, Quantity, Result};
 use crate::function::batch::{Batch, BatchJets};
 use crate::function::deviations::JetDeviations;
 use crate::function::interpolant::Interpolant;
@@ -77,7 +77,7 @@ impl Model {
         request: JetRequest<'_>,
         known: Option<Arc<Solution>>,
         observer: &dyn Observer,
-    ) -> Result<ValuesAt, NumericsError> {
+    ) -> Result<ValuesAt> {
         match self {
             Self::System(_) => {
                 let interpolant = self.interpolant(fitted.values, fitted.mean, known, observer)?;
@@ -98,7 +98,7 @@ impl Model {
         fitted: FittedValues<'_>,
         request: JetRequest<'_>,
         observer: &dyn Observer,
-    ) -> Result<EachAt, NumericsError> {
+    ) -> Result<EachAt> {
         let batch = Batch::fit(self.solver()?.clone(), fitted.values, fitted.mean, observer)?;
         let jets = batch.at(request.queries, request.order, observer)?;
         let report = |interpolant: &Interpolant| {
@@ -127,7 +127,7 @@ fn of_one_function(
     scale: f64,
     request: JetRequest<'_>,
     observer: &dyn Observer,
-) -> Result<ValuesAt, NumericsError> {
+) -> Result<ValuesAt> {
     let jets = interpolant.at(request.queries, request.order, observer)?;
     let (variances, deviations) = uncertainty(&interpolant, scale, request, observer)?;
     let report = Report::of_function(&interpolant.solver, &interpolant.solution, scale);
@@ -141,7 +141,7 @@ fn uncertainty(
     scale: f64,
     request: JetRequest<'_>,
     observer: &dyn Observer,
-) -> Result<(Option<Variances>, Option<JetDeviations>), NumericsError> {
+) -> Result<(Option<Variances>, Option<JetDeviations>)> {
     let Interpolant { solver, solution } = function;
     let variances = || {
         let found = variances_with_mean(solver, solution.trend.as_ref(), request.queries, observer);
@@ -158,7 +158,7 @@ fn around_queries(
     fitted: FittedValues<'_>,
     asked: JetRequest<'_>,
     observer: &dyn Observer,
-) -> Result<ValuesAt, NumericsError> {
+) -> Result<ValuesAt> {
     let FittedValues { values, trend, scale, .. } = fitted;
     // Only computed derivatives have deviations, so the order is raised to that of the deviations.
     let order = asked.deviations.filter(|of| of.degree() > asked.order.degree()).unwrap_or(asked.order);

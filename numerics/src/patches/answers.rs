@@ -9,7 +9,7 @@ use super::neighbourhood::Neighbourhood;
 use super::pooled::Weighted;
 use super::regression::{Model, n_terms};
 use super::room::{Purpose, Room};
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::machine::instruction_set::InstructionSet;
 use crate::machine::lanes::MAX_LANES;
 use crate::machine::small::{Small, zeros};
@@ -149,14 +149,14 @@ impl Patches {
     /// of the cloud, with their noise.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
+    /// `NumericsError::Cancelled`.
     pub fn at(
         &self,
         queries: &Cloud,
         are_points: bool,
         with_deviations: bool,
         observer: &dyn Observer,
-    ) -> Result<PatchGeometry, NumericsError> {
+    ) -> Result<PatchGeometry> {
         let (m, d) = (queries.n_points(), queries.dimension());
         let mut geometry = PatchGeometry::unknown(m, d, with_deviations);
         if self.count < n_terms(d) + 2 {
@@ -172,7 +172,7 @@ impl Patches {
                 observer.checkpoint()?;
                 let first = batch * lanes;
                 let places = room.put(self, queries, first..(first + lanes).min(m));
-                let estimates = self.estimates(room, &places, [&models, &stiff], (d, are_points));
+                let estimates = self.estimates(room, &places, [&models, &stiff], are_points);
                 for (lane, (place, estimate)) in places.iter().zip(&estimates).enumerate() {
                     if let (Some(place), Some(estimate)) = (place, estimate) {
                         slots.put(lane, place, estimate, d, are_points);
@@ -191,8 +191,9 @@ impl Patches {
         room: &mut Room,
         places: &[Option<Neighbourhood>],
         [models, stiff]: [&[Model]; 2],
-        (d, are_points): (usize, bool),
+        are_points: bool,
     ) -> SmallVec<[Option<Estimate>; MAX_LANES]> {
+        let d = self.support.cloud().dimension();
         room.krige(models, Purpose::Prediction);
         let mut estimates = SmallVec::new();
         for (place, kriged) in places.iter().zip(&room.kriged) {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::machine::heap::vec_bytes;
 use crate::observer::Observer;
 use crate::points::cells::{Cells, mean, second_moments};
@@ -36,17 +36,17 @@ impl Support {
     /// Takes the points themselves for a group of 1, and means of at most `group` points otherwise.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
+    /// `NumericsError::Cancelled`.
     pub(crate) fn of(
         group: usize,
         cloud: Arc<Cloud>,
         sampling: Arc<Sampling>,
         observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    ) -> Result<Self> {
         if group == 1 { Ok(Self::Points { cloud, sampling }) } else { Self::means(&cloud, group, observer) }
     }
 
-    fn means(cloud: &Cloud, group: usize, observer: &dyn Observer) -> Result<Self, NumericsError> {
+    fn means(cloud: &Cloud, group: usize, observer: &dyn Observer) -> Result<Self> {
         let d = cloud.dimension();
         let (mut coordinates, mut counts, mut moments) = (Vec::new(), Vec::new(), Vec::new());
         for cell in Cells::of_all(cloud, group).iter() {

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::Patches;
 use super::neighbourhood::{Neighbourhood, Scratch};
 use super::regression::{Batch, Krige, Kriged, Model, workspace};
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::machine::instruction_set::InstructionSet;
 use crate::machine::lanes::Workspace;
 use crate::observer::Observer;
@@ -105,7 +105,7 @@ impl Patches {
         models: &[Model],
         purpose: Purpose,
         observer: &dyn Observer,
-    ) -> Result<Vec<Option<Found>>, NumericsError> {
+    ) -> Result<Vec<Option<Found>>> {
         let (m, d) = (queries.n_points(), queries.dimension());
         let lanes = InstructionSet::best().n_lanes();
         let batches = (0..m.div_ceil(lanes)).into_par_iter().map_init(
@@ -121,7 +121,7 @@ impl Patches {
                     .collect::<Vec<_>>())
             },
         );
-        let batches: Vec<Vec<Option<Found>>> = batches.collect::<Result<_, NumericsError>>()?;
+        let batches: Vec<Vec<Option<Found>>> = batches.collect::<Result<_>>()?;
         Ok(batches.into_iter().flatten().collect())
     }
 }

@@ -1,6 +1,6 @@
 //! Point lists: finite, rectangular, flat. Clouds and queries both have the type [`Cloud`].
 
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::machine::heap::vec_bytes;
 
 /// Largest coordinate accepted, in magnitude. Squared distances, and length scales chosen from them, then
@@ -34,7 +34,7 @@ impl Cloud {
     /// coordinates. [`NumericsError::RaggedPoints`] if their number is not a multiple of `dimension`.
     /// [`NumericsError::NonFiniteCoordinate`] and [`NumericsError::CoordinateTooLarge`] with the first
     /// offending coordinate.
-    pub fn new(mut coordinates: Vec<f64>, dimension: usize) -> Result<Self, NumericsError> {
+    pub fn new(mut coordinates: Vec<f64>, dimension: usize) -> Result<Self> {
         if dimension == 0 {
             return Err(NumericsError::ZeroDimension);
         }
@@ -142,7 +142,7 @@ impl Cloud {
     ///
     /// # Errors
     /// [`NumericsError::DimensionMismatch`] if it does not.
-    pub(crate) fn check_same_dimension(&self, other: &Cloud) -> Result<(), NumericsError> {
+    pub(crate) fn check_same_dimension(&self, other: &Cloud) -> Result<()> {
         let (expected, found) = (self.dimension, other.dimension);
         if expected == found { Ok(()) } else { Err(NumericsError::DimensionMismatch { expected, found }) }
     }
@@ -151,7 +151,7 @@ impl Cloud {
     ///
     /// # Errors
     /// [`NumericsError::LengthMismatch`] if it does not.
-    pub(crate) fn check_one_per_point<T>(&self, entries: &[T]) -> Result<(), NumericsError> {
+    pub(crate) fn check_one_per_point<T>(&self, entries: &[T]) -> Result<()> {
         let (expected, found) = (self.n_points(), entries.len());
         if expected == found { Ok(()) } else { Err(NumericsError::LengthMismatch { expected, found }) }
     }

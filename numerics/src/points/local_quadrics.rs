@@ -7,7 +7,7 @@ use super::neighbourhoods::Neighbourhoods;
 use super::neighbours::Neighbour;
 use super::patch::Patch;
 use super::quadric::Quadric;
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::machine::eigen::symmetric_eigen;
 use crate::machine::heap::vec_bytes;
 use crate::machine::small::Small;
@@ -96,13 +96,13 @@ impl LocalQuadrics {
     /// [`super::quadric::n_quadric_neighbours`] points each.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
+    /// `NumericsError::Cancelled`.
     pub(crate) fn of(
         cloud: &Cloud,
         neighbourhoods: &Neighbourhoods,
         queries: &Cloud,
         observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    ) -> Result<Self> {
         let (m, d) = (queries.n_points(), cloud.dimension());
         let width = width(d);
         let (mut rows, mut found) = (vec![0.0; m * width], vec![Found::Nothing; m]);

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::cloud::Cloud;
 use super::neighbours::{Neighbour, Neighbours};
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::observer::Observer;
 
 /// The nearest positions of a cloud around each of m queries, nearest first.
@@ -19,13 +19,13 @@ impl Neighbourhoods {
     /// Finds the `count` nearest positions around each query.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
+    /// `NumericsError::Cancelled`.
     pub(crate) fn of(
         neighbours: &Neighbours,
         queries: &Cloud,
         count: usize,
         observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    ) -> Result<Self> {
         // Every query finds equally many positions.
         let count = neighbours.nearest_positions(queries.point(0), count).len();
         let mut found = vec![Neighbour { point: 0, squared_distance: 0.0 }; queries.n_points() * count];

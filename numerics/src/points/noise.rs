@@ -6,7 +6,7 @@ use super::cloud::Cloud;
 use super::patch::Patch;
 use super::quadric::{Quadric, n_coefficients};
 use super::sampling::{Sampling, median};
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::observer::Observer;
 
 /// Residual degrees of freedom of the smaller neighbourhood. They are few, so that the neighbourhood stays
@@ -29,12 +29,8 @@ const MAX_SITES: usize = 1000;
 /// Beyond, it is too low, because the neighbourhoods are no longer those of the surface.
 ///
 /// # Errors
-/// [`NumericsError::Cancelled`].
-pub fn estimate_noise(
-    cloud: &Cloud,
-    sampling: &Sampling,
-    observer: &dyn Observer,
-) -> Result<f64, NumericsError> {
+/// `NumericsError::Cancelled`.
+pub fn estimate_noise(cloud: &Cloud, sampling: &Sampling, observer: &dyn Observer) -> Result<f64> {
     let (n, d) = (cloud.n_points(), cloud.dimension());
     if d < 2 {
         return Ok(0.0);
@@ -60,8 +56,7 @@ pub fn estimate_noise(
         Ok(variance_at(site))
     };
     let sites = sampling.of_every_spacing(MAX_SITES);
-    let variances: Vec<Option<f64>> =
-        sites.into_par_iter().map(look_around).collect::<Result<_, NumericsError>>()?;
+    let variances: Vec<Option<f64>> = sites.into_par_iter().map(look_around).collect::<Result<_>>()?;
     let correction = (1.0 - 2.0 / (9.0 * DEGREES_OF_FREEDOM as f64)).powi(3);
     let variance = median(variances.into_iter().flatten().collect());
     Ok(variance.map_or(0.0, |variance| (variance.max(0.0) / correction).sqrt()))

@@ -124,26 +124,33 @@ impl Patch {
         self.breadth < THREAD
     }
 
-    /// Returns whether x is at the rim of the patch: no neighbour lies within 75° of the direction opposite
-    /// to most of them.
-    ///
-    /// In the plane this is an empty sector of 150°. Inside a uniformly random cloud it occurs at 0.2 % of
-    /// the points, at a straight rim at nearly all of them.
+    /// Returns whether x is at the rim of the patch.
     pub(crate) fn is_at_rim(&self) -> bool {
         let k = self.dimension - 1;
-        let tangential = || self.coordinates.chunks_exact(k + 1).map(|t| &t[..k]);
-        let mut away = zeros(k);
-        for t in tangential() {
-            away.iter_mut().zip(t).for_each(|(a, t)| *a -= t);
-        }
-        let length = norm(&away);
-        if length == 0.0 {
-            return false;
-        }
-        const COSINE: f64 = 0.26;
-        // Points closer than a hundredth of the radius have no reliable direction.
-        tangential().filter(|t| norm(t) > 0.01).all(|t| dot(t, &away) < COSINE * length * norm(t))
+        is_at_rim(self.coordinates.chunks_exact(k + 1).map(|t| &t[..k]), k)
     }
+}
+
+/// Cosine of 75°, the half angle of an empty sector at a rim.
+const RIM_COSINE: f64 = 0.26;
+
+/// Distance in units of the radius up to which points have no reliable direction.
+const RIM_LEAST: f64 = 0.01;
+
+/// Returns whether a position is at the rim of its neighbours: none of them lies within 75° of the direction
+/// opposite to most of them.
+///
+/// `tangential` are the coordinates of the neighbours over the tangent plane, `[k]` each, in units of their
+/// radius. In the plane a rim is an empty sector of 150°. Inside a uniformly random cloud it occurs at 0.2 %
+/// of the points, at a straight rim at nearly all of them.
+pub(crate) fn is_at_rim<'a>(tangential: impl Iterator<Item = &'a [f64]> + Clone, k: usize) -> bool {
+    let mut away = zeros(k);
+    for t in tangential.clone() {
+        away.iter_mut().zip(t).for_each(|(a, t)| *a -= t);
+    }
+    let length = norm(&away);
+    let mut directed = tangential.filter(|t| norm(t) > RIM_LEAST);
+    length > 0.0 && directed.all(|t| dot(t, &away) < RIM_COSINE * length * norm(t))
 }
 
 /// Replaces vectors `[k, d]` by their components along the axes of a frame `[d, d]`.

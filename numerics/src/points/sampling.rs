@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::cloud::{Cloud, squared_distance};
 use super::neighbours::{Distances, Neighbour, Neighbours};
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::machine::heap::vec_bytes;
 use crate::machine::price::Price;
 use crate::observer::Observer;
@@ -34,8 +34,8 @@ impl Sampling {
     /// Builds the tree and measures the distances from every position to its neighbours.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub fn of(cloud: &Cloud, observer: &dyn Observer) -> Result<Self, NumericsError> {
+    /// `NumericsError::Cancelled`.
+    pub fn of(cloud: &Cloud, observer: &dyn Observer) -> Result<Self> {
         let neighbours = Neighbours::of(cloud, observer)?;
         let measure = |found: &mut Vec<Neighbour>, position: usize| {
             observer.checkpoint()?;
@@ -44,7 +44,7 @@ impl Sampling {
         let at_positions: Vec<Option<Distances>> = (0..neighbours.n_positions())
             .into_par_iter()
             .map_init(Vec::new, measure)
-            .collect::<Result<_, NumericsError>>()?;
+            .collect::<Result<_>>()?;
         let (mut nearest, mut spacings) = (Vec::with_capacity(cloud.n_points()), vec![0.0; cloud.n_points()]);
         for (position, distances) in at_positions.iter().enumerate() {
             // A position without others is the only one.

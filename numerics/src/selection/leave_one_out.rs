@@ -13,7 +13,7 @@ use super::criterion::Criterion;
 use super::evaluation::{Evaluator, UNDETERMINED, never_definite};
 use super::parameters::Hyperparameters;
 use super::subject::Subject;
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
 use crate::solver::trend::{Mean, Trend};
@@ -74,7 +74,7 @@ pub fn leave_one_out(
     values: &[f64],
     factor: f64,
     observer: &dyn Observer,
-) -> Result<LeaveOneOut, NumericsError> {
+) -> Result<LeaveOneOut> {
     solver.cloud().check_one_per_point(values)?;
     observer.enter(Stage::Solve);
     let mut diagonal = inverse_diagonal(solver, observer)?;
@@ -95,7 +95,7 @@ pub fn leave_one_out_with(
     (cloud, values, mean): (&Cloud, &[f64], Mean),
     at: &Hyperparameters,
     observer: &dyn Observer,
-) -> Result<LeaveOneOut, NumericsError> {
+) -> Result<LeaveOneOut> {
     let subject = Subject::of(cloud, values, mean)?;
     at.noise.check_matches(cloud)?;
     observer.enter(Stage::Factor);
@@ -106,7 +106,7 @@ pub fn leave_one_out_with(
 }
 
 /// Computes `W_ii = |L⁻¹e_i|²`, [`COLUMNS_PER_BLOCK`] columns at a time.
-fn inverse_diagonal(solver: &Solver, observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
+fn inverse_diagonal(solver: &Solver, observer: &dyn Observer) -> Result<Vec<f64>> {
     let n = solver.n_points();
     let mut buffer = vec![0.0; n * COLUMNS_PER_BLOCK.min(n)];
     let mut diagonal = Vec::with_capacity(n);
@@ -125,7 +125,7 @@ fn inverse_diagonal(solver: &Solver, observer: &dyn Observer) -> Result<Vec<f64>
 }
 
 /// Turns `W_ii` into `P_ii`: subtracts the diagonal of `WF(FᵀWF)⁻¹FᵀW`.
-fn remove_mean(diagonal: &mut [f64], solver: &Solver, trend: &Trend) -> Result<(), NumericsError> {
+fn remove_mean(diagonal: &mut [f64], solver: &Solver, trend: &Trend) -> Result<()> {
     let (n, basis) = (diagonal.len(), trend.basis());
     let functionals = basis.functionals(solver).ok_or(NumericsError::MeanNotDetermined)?;
     let mut weights = basis.columns(solver.cloud());

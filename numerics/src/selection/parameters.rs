@@ -1,6 +1,6 @@
 //! Hyperparameters of a process, and which of them a search may vary.
 
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::kernel::{Family, Kernel};
 use crate::points::cloud::Cloud;
 use crate::sums::regularization::Regularization;
@@ -30,9 +30,9 @@ impl Hyperparameters {
     /// Returns the kernel on a cloud.
     ///
     /// # Errors
-    /// [`NumericsError::InvalidKernelParameter`], [`NumericsError::KernelNotPositiveDefinite`].
-    /// [`NumericsError::InvalidLengthScale`], also for a number of length scales that is neither one nor d.
-    pub fn kernel_on(&self, cloud: &Cloud) -> Result<Kernel, NumericsError> {
+    /// `NumericsError::InvalidKernelParameter`, `NumericsError::KernelNotPositiveDefinite`.
+    /// `NumericsError::InvalidLengthScale`, also for a number of length scales that is neither one nor d.
+    pub fn kernel_on(&self, cloud: &Cloud) -> Result<Kernel> {
         let kernel = match self.length_scales[..] {
             [length_scale] => Kernel::new(self.family, length_scale, self.variance),
             ref length_scales => Kernel::of_axes(self.family, length_scales, self.variance),

@@ -3,7 +3,7 @@
 use faer::Mat;
 
 use super::learning::remove_mean;
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::machine::vector::dot;
 use crate::points::cloud::Cloud;
 use crate::solver::trend::{Basis, Mean, Trend, solve_gram};
@@ -30,7 +30,7 @@ impl<'a> Subject<'a> {
     /// # Errors
     /// [`NumericsError::LengthMismatch`]. [`NumericsError::MeanNotDetermined`] if the points do not
     /// distinguish the functions of the mean, or if there are no more points than functions.
-    pub(super) fn of(cloud: &'a Cloud, values: &[f64], mean: Mean) -> Result<Self, NumericsError> {
+    pub(super) fn of(cloud: &'a Cloud, values: &[f64], mean: Mean) -> Result<Self> {
         cloud.check_one_per_point(values)?;
         let (n, basis) = (values.len(), Basis::of(mean, cloud));
         let (functions, p) = (basis.columns(cloud), basis.n_functions());
@@ -50,7 +50,7 @@ impl<'a> Subject<'a> {
     ///
     /// # Errors
     /// [`NumericsError::MeanNotDetermined`].
-    pub(super) fn check_without_one(&self) -> Result<(), NumericsError> {
+    pub(super) fn check_without_one(&self) -> Result<()> {
         let (n, p) = (self.n_points(), self.n_functions);
         if p == 0 {
             return Ok(());

@@ -7,7 +7,7 @@ use faer::MatMut;
 use super::solution::Candidate;
 use super::trend::{Mean, Trend};
 use super::{Method, Solution, Solver};
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::observer::{Observer, Stage};
 use crate::sums::many::values_of_each;
 
@@ -25,7 +25,7 @@ impl Solution {
         values: &[f64],
         mean: Mean,
         observer: &dyn Observer,
-    ) -> Result<Vec<Self>, NumericsError> {
+    ) -> Result<Vec<Self>> {
         let n = solver.n_points();
         let lists = values.chunks_exact(n);
         if !lists.remainder().is_empty() {
@@ -60,7 +60,7 @@ impl Solution {
         lists: &[f64],
         solutions: &mut Vec<Self>,
         observer: &dyn Observer,
-    ) -> Result<(), NumericsError> {
+    ) -> Result<()> {
         let (n, cloud) = (solver.n_points(), solver.cloud());
         let mut weights = lists.to_vec();
         solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, lists.len() / n));

@@ -1,6 +1,6 @@
 //! Prices of factorizations and of solves with them.
 
-use super::dense::Dense;
+use super::Solver;
 use crate::machine::price::Price;
 
 /// Price of factorizing n points densely: in nearly all cases, and at most.
@@ -20,8 +20,8 @@ impl FactorPrice {
             n_numbers.and_then(|n_numbers| n_numbers.checked_mul(size_of::<f64>())).unwrap_or(usize::MAX)
         };
         Self {
-            expected: Price { n_bytes: bytes(Dense::n_numbers_needed(n_points)), flops: n.powi(3) / 3.0 },
-            at_most: Price { n_bytes: bytes(Dense::n_numbers_needed_at_most(n_points)), flops: n.powi(3) },
+            expected: Price { n_bytes: bytes(Solver::n_numbers_needed(n_points)), flops: n.powi(3) / 3.0 },
+            at_most: Price { n_bytes: bytes(Solver::n_numbers_needed_at_most(n_points)), flops: n.powi(3) },
         }
     }
 }

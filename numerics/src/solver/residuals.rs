@@ -6,7 +6,7 @@
 use faer::MatMut;
 
 use super::{Method, Solution, Solver};
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::machine::vector::norm;
 use crate::observer::Observer;
 
@@ -39,11 +39,7 @@ impl Outlier {
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
-    pub(super) fn of(
-        solver: &Solver,
-        weights: &[f64],
-        observer: &dyn Observer,
-    ) -> Result<Option<Self>, NumericsError> {
+    pub(super) fn of(solver: &Solver, weights: &[f64], observer: &dyn Observer) -> Result<Option<Self>> {
         if solver.method() != Method::Cholesky {
             return Ok(None);
         }

@@ -5,7 +5,7 @@ use faer::MatMut;
 use super::residuals::Outlier;
 use super::trend::{Mean, Trend};
 use super::{Method, Solver};
-use crate::error::{NotDefinite, NumericsError};
+use crate::error::{NotDefinite, NumericsError, Result};
 use crate::machine::heap::vec_bytes;
 use crate::observer::{Observer, Stage};
 use crate::sums::jets::{JetOrder, Jets};
@@ -60,7 +60,7 @@ impl Solution {
     /// # Errors
     /// [`NumericsError::LengthMismatch`], [`NumericsError::WeightsOverflow`], [`NumericsError::Cancelled`].
     /// [`NumericsError::NotPositiveDefinite`] if the residual exceeds 1e-5 or the backward error 1e-13.
-    pub fn of(solver: &Solver, values: &[f64], observer: &dyn Observer) -> Result<Self, NumericsError> {
+    pub fn of(solver: &Solver, values: &[f64], observer: &dyn Observer) -> Result<Self> {
         Ok(Self::solve(solver, values, None, observer)?.0)
     }
 
@@ -69,12 +69,7 @@ impl Solution {
     ///
     /// # Errors
     /// [`NumericsError::MeanNotDetermined`], and the errors of [`Solution::of`].
-    pub fn with_mean(
-        solver: &Solver,
-        values: &[f64],
-        mean: Mean,
-        observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    pub fn with_mean(solver: &Solver, values: &[f64], mean: Mean, observer: &dyn Observer) -> Result<Self> {
         solver.cloud().check_one_per_point(values)?;
         observer.enter(Stage::Solve);
         let found = match Trend::fit(solver, values, mean)? {
@@ -98,7 +93,7 @@ impl Solution {
         values: &[f64],
         order: JetOrder,
         observer: &dyn Observer,
-    ) -> Result<(Self, Option<Jets>), NumericsError> {
+    ) -> Result<(Self, Option<Jets>)> {
         Self::solve(solver, values, Some(order), observer)
     }
 
@@ -107,7 +102,7 @@ impl Solution {
         values: &[f64],
         order: Option<JetOrder>,
         observer: &dyn Observer,
-    ) -> Result<(Self, Option<Jets>), NumericsError> {
+    ) -> Result<(Self, Option<Jets>)> {
         solver.cloud().check_one_per_point(values)?;
         observer.enter(Stage::Solve);
         let candidate = |weights| Candidate::new(solver, values, weights, order, observer);
@@ -159,7 +154,7 @@ impl Candidate {
         weights: Vec<f64>,
         order: Option<JetOrder>,
         observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    ) -> Result<Self> {
         if weights.iter().any(|w| !w.is_finite()) {
             return Err(NumericsError::WeightsOverflow);
         }
@@ -205,7 +200,7 @@ impl Candidate {
         solver: &Solver,
         values: &[f64],
         refined: bool,
-    ) -> Result<(Solution, Option<Jets>), NumericsError> {
+    ) -> Result<(Solution, Option<Jets>)> {
         let relative_residual = self.relative_residual(values);
         let backward_error = self.backward_error(solver, values);
         if relative_residual.is_nan() || relative_residual > MAX_RELATIVE_RESIDUAL {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::kernel::Kernel;
 use crate::machine::heap::{arc_payload, block_bytes, vec_bytes};
 use crate::points::cloud::Cloud;
@@ -24,11 +24,7 @@ impl System {
     /// # Errors
     /// [`NumericsError::KernelNotPositiveDefinite`] in this dimension. [`NumericsError::LengthMismatch`] of
     /// noise variances. [`NumericsError::DuplicatePoints`] if two coinciding points have no regularization.
-    pub fn new(
-        cloud: Arc<Cloud>,
-        kernel: Kernel,
-        regularization: Regularization,
-    ) -> Result<Self, NumericsError> {
+    pub fn new(cloud: Arc<Cloud>, kernel: Kernel, regularization: Regularization) -> Result<Self> {
         kernel.check_dimension(cloud.dimension())?;
         regularization.check_matches(&cloud)?;
         let twins = coinciding_points(&cloud, |point| regularization.at(point) == 0.0);

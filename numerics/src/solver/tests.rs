@@ -1,6 +1,9 @@
 use faer::Mat;
 
+use faer::MatMut;
+
 use super::*;
+use crate::error::NumericsError;
 use crate::kernel::Family;
 use crate::observer::{Stage, Unobserved};
 use crate::points::cloud::squared_distance;

@@ -10,7 +10,7 @@ use faer::{Mat, MatMut, Side};
 use rayon::prelude::*;
 
 use super::Solver;
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::machine::heap::vec_bytes;
 use crate::machine::vector::dot;
 use crate::points::cloud::Cloud;
@@ -166,7 +166,7 @@ impl Trend {
     ///
     /// # Errors
     /// [`NumericsError::MeanNotDetermined`] if the points do not distinguish its functions.
-    pub(crate) fn fit(solver: &Solver, values: &[f64], mean: Mean) -> Result<Option<Self>, NumericsError> {
+    pub(crate) fn fit(solver: &Solver, values: &[f64], mean: Mean) -> Result<Option<Self>> {
         Ok(Self::fit_each(solver, values, mean)?.map(|mut trends| trends.remove(0)))
     }
 
@@ -174,11 +174,7 @@ impl Trend {
     ///
     /// # Errors
     /// Returns the errors of [`Trend::fit`].
-    pub(super) fn fit_each(
-        solver: &Solver,
-        values: &[f64],
-        mean: Mean,
-    ) -> Result<Option<Vec<Self>>, NumericsError> {
+    pub(super) fn fit_each(solver: &Solver, values: &[f64], mean: Mean) -> Result<Option<Vec<Self>>> {
         if mean == Mean::Zero {
             return Ok(None);
         }

@@ -2,7 +2,7 @@
 
 use super::jets::{JetOrder, Jets};
 use super::symmetric::kernel_times;
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::kernel::Kernel;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
@@ -25,12 +25,7 @@ impl Expansion<'_> {
     ///
     /// # Errors
     /// Returns the errors of [`Jets::evaluate`].
-    pub fn at(
-        self,
-        queries: &Cloud,
-        order: JetOrder,
-        observer: &dyn Observer,
-    ) -> Result<Jets, NumericsError> {
+    pub fn at(self, queries: &Cloud, order: JetOrder, observer: &dyn Observer) -> Result<Jets> {
         if std::ptr::eq(queries, self.centres) && order == JetOrder::Hessian {
             Jets::at_points(self.centres, self.kernel, self.weights, observer)
         } else {
@@ -43,11 +38,7 @@ impl Expansion<'_> {
     ///
     /// # Errors
     /// Returns the errors of [`Jets::evaluate`].
-    pub(crate) fn values_at(
-        self,
-        queries: &Cloud,
-        observer: &dyn Observer,
-    ) -> Result<Vec<f64>, NumericsError> {
+    pub(crate) fn values_at(self, queries: &Cloud, observer: &dyn Observer) -> Result<Vec<f64>> {
         if std::ptr::eq(queries, self.centres) {
             kernel_times(self.centres, self.kernel, self.weights, observer)
         } else {

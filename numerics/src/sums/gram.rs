@@ -5,9 +5,9 @@ use std::ops::Range;
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::nodes::Nodes;
+use super::nodes::{Nodes, PackPlace};
 use super::regularization::Regularization;
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::kernel::{Kernel, Pairs};
 use crate::machine::registers::{BLOCK, Block, Pack};
 use crate::observer::Observer;
@@ -21,7 +21,7 @@ const COLUMNS_PER_TASK: usize = 16;
 /// `gram[j·stride + i] = k(x_i, x_j) + [i = j] α_i` for i ≥ j. Entries above the diagonal are left untouched.
 ///
 /// # Errors
-/// [`NumericsError::Cancelled`].
+/// `NumericsError::Cancelled`.
 pub(crate) fn fill_lower_gram(
     cloud: &Cloud,
     kernel: &Kernel,
@@ -29,7 +29,7 @@ pub(crate) fn fill_lower_gram(
     gram: &mut [f64],
     stride: usize,
     observer: &dyn Observer,
-) -> Result<(), NumericsError> {
+) -> Result<()> {
     let (nodes, n) = (Nodes::of(cloud), cloud.n_points());
     gram.par_chunks_mut(stride * COLUMNS_PER_TASK).enumerate().try_for_each(|(task, columns)| {
         observer.checkpoint()?;
@@ -40,6 +40,15 @@ pub(crate) fn fill_lower_gram(
         }
         Ok(())
     })
+}
+
+/// Copies the lower triangle of `[n, n]` to the upper one.
+pub(crate) fn mirror(matrix: &mut [f64], n: usize) {
+    for j in 0..n {
+        for i in 0..j {
+            matrix[j * n + i] = matrix[i * n + j];
+        }
+    }
 }
 
 /// Writes `out[i − points.start] = k(x_i, x)` for a range of points.
@@ -58,14 +67,14 @@ pub(crate) fn fill_kernel_column(
 /// `cross[j·n + i] = k(x_i, q_j)`.
 ///
 /// # Errors
-/// [`NumericsError::Cancelled`].
+/// `NumericsError::Cancelled`.
 pub fn fill_cross_gram(
     nodes: &Nodes,
     kernel: &Kernel,
     queries: &Cloud,
     cross: &mut [f64],
     observer: &dyn Observer,
-) -> Result<(), NumericsError> {
+) -> Result<()> {
     let n = nodes.n_points();
     cross.par_chunks_mut(n * COLUMNS_PER_TASK).enumerate().try_for_each(|(task, rows)| {
         observer.checkpoint()?;
@@ -116,7 +125,7 @@ impl<S: Simd> Pairs<S> for Values<'_, S> {
     #[inline(always)]
     fn pack(&mut self, at: usize) -> (Pack<S>, ()) {
         let KernelColumn { nodes, kernel, x, .. } = self.column;
-        (nodes.scaled_distances(self.simd, (self.block, at), x, kernel, |_, _| ()), ())
+        (nodes.scaled_distances(self.simd, PackPlace { block: self.block, at }, x, kernel, |_, _| ()), ())
     }
 
     #[inline(always)]

@@ -5,7 +5,7 @@ use faer::{Accum, MatMut, MatRef};
 
 use super::gram::fill_cross_gram;
 use super::nodes::Nodes;
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::kernel::Kernel;
 use crate::machine::parallelism::parallelism;
 use crate::observer::Observer;
@@ -24,7 +24,7 @@ pub(crate) fn values_of_each(
     weights: &[f64],
     queries: &Cloud,
     observer: &dyn Observer,
-) -> Result<Vec<f64>, NumericsError> {
+) -> Result<Vec<f64>> {
     let (r, m, d) = (centres.n_points(), queries.n_points(), queries.dimension());
     let k = weights.len() / r;
     let nodes = Nodes::of(centres);

@@ -52,7 +52,7 @@ impl Nodes {
         self.instruction_set.dispatch(op)
     }
 
-    /// Returns `q = |u|²/ℓ²` between x and pack `at` of the points y of a block.
+    /// Returns `q = |u|²/ℓ²` between x and a pack of points y.
     ///
     /// Here u is the difference `x − y`, stretched as the kernel stretches it. `each(c, u[c])` is called for
     /// every coordinate c, in order.
@@ -60,11 +60,12 @@ impl Nodes {
     pub(crate) fn scaled_distances<S: Simd>(
         &self,
         simd: S,
-        (block, at): (usize, usize),
+        place: PackPlace,
         x: &[f64],
         kernel: &Kernel,
         mut each: impl FnMut(usize, Pack<S>),
     ) -> Pack<S> {
+        let PackPlace { block, at } = place;
         let columns = &self.coordinates[block * self.dimension..][..self.dimension];
         let coordinates = columns.iter().zip(x).enumerate();
         let mut sum = Pack::splat(simd, 0.0);
@@ -87,6 +88,13 @@ impl Nodes {
         }
         sum * kernel.inverse_square_length()
     }
+}
+
+/// The place of a pack of points: number `at` of a block.
+#[derive(Clone, Copy)]
+pub(crate) struct PackPlace {
+    pub(crate) block: usize,
+    pub(crate) at: usize,
 }
 
 /// Lays out one number per point like [`Nodes`], with zeros where the last block is padded.

@@ -1,6 +1,6 @@
 //! The regularization α, added to the diagonal of the Gram matrix.
 
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::points::cloud::Cloud;
 
 /// The regularization α, unit V², added to the diagonal of the (variance-scaled) Gram matrix as given.
@@ -19,7 +19,7 @@ impl Regularization {
     ///
     /// # Errors
     /// [`NumericsError::InvalidRegularization`] if α is negative, not finite or above 1e300.
-    pub fn uniform(alpha: f64) -> Result<Self, NumericsError> {
+    pub fn uniform(alpha: f64) -> Result<Self> {
         check("alpha", alpha, None)?;
         Ok(Self::Uniform(alpha))
     }
@@ -29,7 +29,7 @@ impl Regularization {
     /// # Errors
     /// [`NumericsError::InvalidRegularization`] with the first point whose variance is negative, not finite
     /// or above 1e300.
-    pub fn per_point(variances: Vec<f64>) -> Result<Self, NumericsError> {
+    pub fn per_point(variances: Vec<f64>) -> Result<Self> {
         for (point, &variance) in variances.iter().enumerate() {
             check("noise variance", variance, Some(point))?;
         }
@@ -40,7 +40,7 @@ impl Regularization {
     ///
     /// # Errors
     /// [`NumericsError::LengthMismatch`] if the number of entries differs.
-    pub(crate) fn check_matches(&self, cloud: &Cloud) -> Result<(), NumericsError> {
+    pub(crate) fn check_matches(&self, cloud: &Cloud) -> Result<()> {
         match self {
             Self::Uniform(_) => Ok(()),
             Self::PerPoint(variances) => cloud.check_one_per_point(variances),
@@ -57,7 +57,7 @@ impl Regularization {
 }
 
 /// Checks that a value lies between 0 and 1e300, so that adding it to a kernel value stays finite.
-fn check(parameter: &'static str, value: f64, point: Option<usize>) -> Result<(), NumericsError> {
+fn check(parameter: &'static str, value: f64, point: Option<usize>) -> Result<()> {
     if (0.0..=1e300).contains(&value) {
         Ok(())
     } else {

@@ -5,8 +5,8 @@
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::nodes::{Nodes, blocked};
-use crate::error::NumericsError;
+use super::nodes::{Nodes, PackPlace, blocked};
+use crate::error::{NumericsError, Result};
 use crate::kernel::{Kernel, Pairs};
 use crate::machine::registers::{BLOCK, Block, Pack};
 use crate::observer::Observer;
@@ -21,7 +21,7 @@ pub(crate) fn kernel_times(
     kernel: &Kernel,
     weights: &[f64],
     observer: &dyn Observer,
-) -> Result<Vec<f64>, NumericsError> {
+) -> Result<Vec<f64>> {
     over(&Nodes::of(cloud), cloud, kernel, weights, observer)
 }
 
@@ -32,7 +32,7 @@ fn over(
     kernel: &Kernel,
     weights: &[f64],
     observer: &dyn Observer,
-) -> Result<Vec<f64>, NumericsError> {
+) -> Result<Vec<f64>> {
     let weights = blocked(weights);
     let pair = |a: Share<'_>, b: Option<Share<'_>>| {
         nodes.dispatch(BlockPair { nodes, kernel, weights: &weights, cloud, a, b });
@@ -64,7 +64,7 @@ pub(crate) fn sum_pairs(
     n_sums: usize,
     pair: impl Fn(Share<'_>, Option<Share<'_>>) + Sync,
     observer: &dyn Observer,
-) -> Result<Vec<Block>, NumericsError> {
+) -> Result<Vec<Block>> {
     let mut sums = vec![Block::ZERO; n_blocks * n_sums];
     let mut seats: Vec<Option<Share<'_>>> = sums.chunks_exact_mut(n_sums).enumerate().map(Some).collect();
     seats.par_iter_mut().flatten().for_each(|(block, sums)| pair((*block, sums), None));
@@ -141,7 +141,7 @@ impl<S: Simd> Pairs<S> for Row<'_, S> {
     #[inline(always)]
     fn pack(&mut self, at: usize) -> (Pack<S>, ()) {
         let (nodes, kernel, x, block) = self.position;
-        (nodes.scaled_distances(self.simd, (block, at), x, kernel, |_, _| ()), ())
+        (nodes.scaled_distances(self.simd, PackPlace { block, at }, x, kernel, |_, _| ()), ())
     }
 
     #[inline(always)]

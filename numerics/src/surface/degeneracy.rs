@@ -1,7 +1,7 @@
 //! Criteria for queries where geometry is undefined, or less accurate than its digits suggest
 //! (docs/numerics.md, Geometry).
 
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::function::interpolant::Interpolant;
 use crate::kernel::{Kernel, MAX_SLOPE};
 use crate::machine::vector::{dot, norm};
@@ -86,13 +86,13 @@ const FAR_SPACINGS: f64 = 3.0;
 /// of k and ℓ|∇k|. Nearly every gradient exceeds that bound, so magnitudes are evaluated only for the others.
 ///
 /// # Errors
-/// [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
+/// `NumericsError::Overflow`, `NumericsError::Cancelled`.
 pub(crate) fn roundings(
     signature: &Interpolant,
     queries: &Cloud,
     jets: &Jets,
     observer: &dyn Observer,
-) -> Result<Vec<bool>, NumericsError> {
+) -> Result<Vec<bool>> {
     let (kernel, solution) = (signature.solver.kernel(), &signature.solution);
     let length_scale = kernel.length_scale();
     let total: f64 = solution.weights.iter().map(|weight| weight.abs()).sum();

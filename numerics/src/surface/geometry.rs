@@ -7,7 +7,7 @@ use super::curvature::{principal_curvatures, tangential_trace};
 use super::degeneracy::{Degeneracy, DegeneracyReason, Resolution, is_far};
 pub use super::request::{GeometryRequest, Orientation, SurfaceModel};
 use super::served::{Deviations, Served, ServedBy};
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::machine::vector::norm;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
@@ -48,7 +48,7 @@ impl Geometry {
         queries: &Cloud,
         request: &GeometryRequest,
         observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    ) -> Result<Self> {
         let served = surface.serve(queries, request, observer)?;
         let (m, d) = (queries.n_points(), queries.dimension());
         let gradient_norms: Vec<f64> = (0..m).map(|query| norm(served.gradient(query))).collect();
@@ -137,12 +137,12 @@ impl Geometry {
 
     /// Standard deviations, if they were asked for.
     pub fn deviations(&self) -> Option<&Deviations> {
-        self.served.deviations()
+        self.served.deviations.as_ref()
     }
 
     /// Values of u at the queries, `[m]`: 1 on the surface at α = 0.
     pub fn levels(&self) -> &[f64] {
-        self.served.levels()
+        &self.served.levels
     }
 
     /// Gradient norm |∇u| of the function that serves each query, `[m]`. Unit 1/L for the signature function,
@@ -174,8 +174,8 @@ impl Geometry {
     /// A sphere of radius r with outward normals has curvatures +1/r.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub fn curvatures(&self, observer: &dyn Observer) -> Result<Curvatures, NumericsError> {
+    /// `NumericsError::Cancelled`.
+    pub fn curvatures(&self, observer: &dyn Observer) -> Result<Curvatures> {
         let (d, m) = (self.dimension(), self.n_queries());
         let k = d - 1;
         let mut curvatures = Curvatures {

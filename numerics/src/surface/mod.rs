@@ -12,7 +12,7 @@ mod curvature;
 mod orientation;
 mod request;
 
-use super::error::{NumericsError, Quantity, SolverKind};
+use super::error::{NumericsError, Quantity, Result, SolverKind};
 use super::function::interpolant::Interpolant;
 use super::observer::Observer;
 use crate::machine::vector::dot;
@@ -41,11 +41,7 @@ impl Surface {
     ///
     /// # Errors
     /// Returns the errors of [`SignatureSurface::of`].
-    pub fn of(
-        signature: Interpolant,
-        given: Option<&Cloud>,
-        observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    pub fn of(signature: Interpolant, given: Option<&Cloud>, observer: &dyn Observer) -> Result<Self> {
         Ok(SignatureSurface::of(signature, given, observer)?.into())
     }
 
@@ -92,7 +88,7 @@ impl Surface {
     /// Neighbour search among the points of the surface.
     pub fn neighbours(&self) -> &Neighbours {
         match self {
-            Self::Signature(surface) => surface.sampling().neighbours(),
+            Self::Signature(surface) => surface.sampling.neighbours(),
             Self::Local(surface) => surface.sampling().neighbours(),
         }
     }
@@ -105,12 +101,7 @@ impl Surface {
         }
     }
 
-    fn serve(
-        &self,
-        queries: &Cloud,
-        request: &GeometryRequest,
-        observer: &dyn Observer,
-    ) -> Result<Served, NumericsError> {
+    fn serve(&self, queries: &Cloud, request: &GeometryRequest, observer: &dyn Observer) -> Result<Served> {
         match self {
             Self::Signature(surface) => signature::serve(surface, queries, request, observer),
             Self::Local(surface) => surface.serve(queries, request, observer),

@@ -68,12 +68,4 @@ impl Served {
     pub(crate) fn verdict(&self, query: usize) -> Verdict {
         self.verdicts[query]
     }
-
-    pub(crate) fn deviations(&self) -> Option<&Deviations> {
-        self.deviations.as_ref()
-    }
-
-    pub(crate) fn levels(&self) -> &[f64] {
-        &self.levels
-    }
 }

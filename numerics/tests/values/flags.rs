@@ -125,11 +125,11 @@ impl Request {
         let found = Operator::SurfaceGradient.apply(&geometry, &interpolant, &at, &Unobserved)?;
         let doubts = judged(&found).judge(Operator::SurfaceGradient, &Unobserved)?;
         let exact: Vec<f64> = truth.iter().flat_map(|(jet, on)| tangential(jet, on)).collect();
-        counts.add(0, (&found, &exact), &geometry, &doubts);
+        counts.add(0, &found, &exact, &geometry, &doubts);
         let found = Operator::LaplaceBeltrami.apply(&geometry, &interpolant, &at, &Unobserved)?;
         let doubts = judged(&found).judge(Operator::LaplaceBeltrami, &Unobserved)?;
         let exact: Vec<f64> = truth.iter().map(|(jet, on)| laplacian(jet, on)).collect();
-        counts.add(1, (&found, &exact), &geometry, &doubts);
+        counts.add(1, &found, &exact, &geometry, &doubts);
         Ok(counts)
     }
 
@@ -180,13 +180,7 @@ fn solver(cloud: &Arc<Cloud>, kernel: Kernel, alpha: f64) -> Result<Arc<Solver>,
 }
 
 impl Counts {
-    fn add(
-        &mut self,
-        operator: usize,
-        (found, exact): (&[f64], &[f64]),
-        geometry: &Geometry,
-        doubts: &[usize],
-    ) {
+    fn add(&mut self, operator: usize, found: &[f64], exact: &[f64], geometry: &Geometry, doubts: &[usize]) {
         let m = geometry.n_queries();
         let k = found.len() / m;
         let mut is_flagged = geometry.is_null().to_vec();

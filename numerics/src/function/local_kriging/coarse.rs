@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::NEIGHBOURS;
 use super::near::Near;
 use super::{KrigingRequest, LocalKriging};
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::function::functionals::{JetFunctional, has_variance};
 use crate::kernel::Kernel;
 use crate::observer::Observer;
@@ -65,7 +65,7 @@ impl LocalKriging {
         queries: &Cloud,
         order: JetOrder,
         observer: &dyn Observer,
-    ) -> Result<Option<Coarse>, NumericsError> {
+    ) -> Result<Option<Coarse>> {
         if !has_variance(self.system.kernel(), 2) {
             return Ok(None);
         }
@@ -89,7 +89,7 @@ impl LocalKriging {
     /// The noise of a mean of m points is 1/m of theirs. Bending of the field within a cell counts as
     /// additional noise. With M the second moments of the points about their mean, the mean of the field
     /// differs by `½ M : D²u` from the field at the mean point.
-    fn coarse(&self, size: usize, observer: &dyn Observer) -> Result<Coarse, NumericsError> {
+    fn coarse(&self, size: usize, observer: &dyn Observer) -> Result<Coarse> {
         let (cloud, kernel) = (self.system.cloud(), self.system.kernel());
         let cells = Cells::of_all(cloud, size);
         observer.checkpoint()?;
@@ -112,12 +112,7 @@ impl LocalKriging {
     /// Returns the root mean square deviation of the derivatives of highest order at some queries.
     ///
     /// Deviations do not depend on the values, so zeros take their place.
-    fn uncertainty(
-        &self,
-        queries: &Cloud,
-        order: JetOrder,
-        observer: &dyn Observer,
-    ) -> Result<f64, NumericsError> {
+    fn uncertainty(&self, queries: &Cloud, order: JetOrder, observer: &dyn Observer) -> Result<f64> {
         let request = KrigingRequest { order, has_variances: false, has_deviations: true, trend: None };
         let found = self.at(&vec![0.0; self.system.n_points()], queries, request, observer)?;
         let all = found.deviations.unwrap_or_default();

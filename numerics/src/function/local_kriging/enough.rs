@@ -2,7 +2,7 @@
 
 use super::NEIGHBOURS;
 use super::{Asked, KrigingRequest, LocalKriging, Quantities, Raw};
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::machine::instruction_set::InstructionSet;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
@@ -34,7 +34,7 @@ impl LocalKriging {
         queries: &Cloud,
         trend: Option<&Trend>,
         observer: &dyn Observer,
-    ) -> Result<Option<f64>, NumericsError> {
+    ) -> Result<Option<f64>> {
         if self.system.n_points() <= NEIGHBOURS {
             return Ok(None);
         }

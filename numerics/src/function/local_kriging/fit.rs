@@ -5,7 +5,7 @@ use super::kriging::{Krige, Workspace};
 use super::parts::{Found, Parts};
 use super::quantities::{Quantities, Quantity, Sized};
 use super::{Asked, LocalKriging};
-use crate::error::{NotDefinite, NumericsError};
+use crate::error::{NotDefinite, NumericsError, Result};
 use crate::machine::instruction_set::InstructionSet;
 use crate::machine::vector::dot;
 use crate::points::cloud::Cloud;
@@ -92,7 +92,7 @@ impl Room {
     ///
     /// # Errors
     /// [`NumericsError::KernelNotSmooth`] if a query is a point of the cloud and that is refused.
-    pub(super) fn put(&mut self, fit: &Fit<'_>, first: usize, n_queries: usize) -> Result<(), NumericsError> {
+    pub(super) fn put(&mut self, fit: &Fit<'_>, first: usize, n_queries: usize) -> Result<()> {
         let LocalKriging { system, near, .. } = fit.moving;
         self.functionals.clear();
         for lane in 0..n_queries {
@@ -135,7 +135,7 @@ impl Fit<'_> {
         first: usize,
         jets: &mut [f64],
         sure: &mut [f64],
-    ) -> Result<usize, NumericsError> {
+    ) -> Result<usize> {
         let kernel = self.moving.system.kernel();
         let parts = self.parts;
         room.set.dispatch(Krige { batch: &room.batch, kernel, parts, workspace: &mut room.workspace });
@@ -155,12 +155,12 @@ impl Fit<'_> {
             if parts.variances {
                 sure[0] = kernel.at_zero() - room.sums[places.explained];
                 self.check_is_rounding(query, sure[0], room.sums[places.norm_squared], &room.batch)?;
-                sure[0] += self.of_mean(query, Quantity::Value, (&room.sums, 0));
+                sure[0] += self.of_mean(query, Quantity::Value, &room.sums, 0);
             }
             for (at, slot) in sure[1..].iter_mut().enumerate() {
-                let quantity = self.quantities.get(&room.functionals, (lane, at));
+                let quantity = self.quantities.get(&room.functionals, lane, at);
                 let explained = room.sums[places.of_quantities() + at];
-                let unexplained = self.of_mean(query, quantity, (&room.sums, 1 + at));
+                let unexplained = self.of_mean(query, quantity, &room.sums, 1 + at);
                 let variance = quantity.prior_variance(kernel) - explained + unexplained;
                 // NaN propagates.
                 *slot = if variance < 0.0 { -0.0 } else { quantity.unit() * variance.sqrt() };
@@ -177,7 +177,7 @@ impl Fit<'_> {
     /// h is the part of the mean's functions that the neighbours do not explain. C is the covariance of the
     /// functions' coefficients (Rasmussen and Williams 2006, eq. 2.42). `place` is that of the quantity: 0
     /// for the value, then the others in order.
-    fn of_mean(&self, query: usize, quantity: Quantity<'_>, (sums, place): (&[f64], usize)) -> f64 {
+    fn of_mean(&self, query: usize, quantity: Quantity<'_>, sums: &[f64], place: usize) -> f64 {
         let Some(TrendUncertainty { basis, covariance }) = self.uncertainty else { return 0.0 };
         let mut unexplained = quantity.on_mean(basis, self.queries.point(query));
         let first = Found::of(self.queries.dimension()).of_functions(&self.parts) + place;
@@ -189,13 +189,7 @@ impl Fit<'_> {
     }
 
     /// Checks that a negative variance is at least −τ, the tolerance of [`LocalKriging::at`].
-    fn check_is_rounding(
-        &self,
-        query: usize,
-        variance: f64,
-        norm_squared: f64,
-        batch: &Batch,
-    ) -> Result<(), NumericsError> {
+    fn check_is_rounding(&self, query: usize, variance: f64, norm_squared: f64, batch: &Batch) -> Result<()> {
         if variance >= 0.0 {
             return Ok(());
         }

@@ -34,7 +34,7 @@ use rayon::prelude::*;
 
 use super::deviations::JetDeviations;
 use super::posterior::Variances;
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::machine::instruction_set::InstructionSet;
 use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
@@ -134,12 +134,8 @@ impl LocalKriging {
     /// Prepares local kriging of a system, given the sampling of its cloud.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub fn new(
-        system: System,
-        sampling: Arc<Sampling>,
-        observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    /// `NumericsError::Cancelled`.
+    pub fn new(system: System, sampling: Arc<Sampling>, observer: &dyn Observer) -> Result<Self> {
         let near = match system.kernel().stretched_cloud(system.cloud()) {
             None => Near::Sampled(sampling),
             Some(cloud) => Near::Stretched(Neighbours::of(&cloud, observer)?),
@@ -169,19 +165,19 @@ impl LocalKriging {
     /// `τ = 4ε(k₀ + (k k₀ + max α)|w|²)`, with k the number of neighbours.
     ///
     /// # Errors
-    /// - [`NumericsError::DimensionMismatch`], [`NumericsError::LengthMismatch`].
-    /// - [`NumericsError::KernelNotSmooth`] if derivatives are asked for at a point of the cloud and the
+    /// - `NumericsError::DimensionMismatch`, `NumericsError::LengthMismatch`.
+    /// - `NumericsError::KernelNotSmooth` if derivatives are asked for at a point of the cloud and the
     ///   kernel has a kink there.
-    /// - [`NumericsError::DerivativesVary`] if deviations are asked for derivatives that the process lacks.
-    /// - [`NumericsError::NotPositiveDefinite`] if a variance is below −τ.
-    /// - [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
+    /// - `NumericsError::DerivativesVary` if deviations are asked for derivatives that the process lacks.
+    /// - `NumericsError::NotPositiveDefinite` if a variance is below −τ.
+    /// - `NumericsError::Overflow`, `NumericsError::Cancelled`.
     pub fn at(
         &self,
         values: &[f64],
         queries: &Cloud,
         request: KrigingRequest<'_>,
         observer: &dyn Observer,
-    ) -> Result<KrigingAnswer, NumericsError> {
+    ) -> Result<KrigingAnswer> {
         self.at_with(InstructionSet::best(), values, queries, request, observer)
     }
 
@@ -192,7 +188,7 @@ impl LocalKriging {
         queries: &Cloud,
         request: KrigingRequest<'_>,
         observer: &dyn Observer,
-    ) -> Result<KrigingAnswer, NumericsError> {
+    ) -> Result<KrigingAnswer> {
         let (kernel, d, order) = (self.system.kernel(), queries.dimension(), request.order.degree());
         let quantities = if request.has_deviations {
             Quantities::derivatives(kernel, d, order)?
@@ -222,7 +218,7 @@ impl LocalKriging {
         queries: &Cloud,
         asked: FunctionalsRequest<'_>,
         observer: &dyn Observer,
-    ) -> Result<KrigedFunctionals, NumericsError> {
+    ) -> Result<KrigedFunctionals> {
         let FunctionalsRequest { order, functionals, count, trend } = asked;
         let quantities = Quantities::functionals(self.system.kernel(), functionals, count, order.degree())?;
         let request = KrigingRequest { order, has_variances: false, has_deviations: false, trend };
@@ -233,13 +229,7 @@ impl LocalKriging {
         Ok(KrigedFunctionals { jets, deviations, n_dependent })
     }
 
-    fn run(
-        &self,
-        values: &[f64],
-        queries: &Cloud,
-        asked: Asked<'_>,
-        observer: &dyn Observer,
-    ) -> Result<Raw, NumericsError> {
+    fn run(&self, values: &[f64], queries: &Cloud, asked: Asked<'_>, observer: &dyn Observer) -> Result<Raw> {
         let (set, trend) = (asked.set, asked.request.trend);
         let cloud = self.system.cloud();
         cloud.check_same_dimension(queries)?;

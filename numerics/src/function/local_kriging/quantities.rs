@@ -1,6 +1,6 @@
 //! Quantities besides the value whose deviations are asked for.
 
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::function::functionals::{JetFunctional, has_variance};
 use crate::kernel::Kernel;
 use crate::machine::small::{Small, zeros};
@@ -60,7 +60,7 @@ impl<'a> Quantities<'a> {
     ///
     /// # Errors
     /// [`NumericsError::DerivativesVary`] if the process has no derivatives of this order.
-    pub(super) fn derivatives(kernel: &Kernel, d: usize, order: usize) -> Result<Self, NumericsError> {
+    pub(super) fn derivatives(kernel: &Kernel, d: usize, order: usize) -> Result<Self> {
         if !has_variance(kernel, order) {
             return Err(NumericsError::DerivativesVary { order });
         }
@@ -94,7 +94,7 @@ impl<'a> Quantities<'a> {
         of: Functionals<'a>,
         count: usize,
         order: usize,
-    ) -> Result<Self, NumericsError> {
+    ) -> Result<Self> {
         if has_variance(kernel, order) {
             Ok(Self::Functionals { of, count, order })
         } else {
@@ -113,7 +113,7 @@ impl<'a> Quantities<'a> {
     }
 
     /// Returns quantity number `at` of a lane. `functionals` are those of all lanes, `count` for each.
-    pub(super) fn get<'b>(&'b self, functionals: &'b [Sized], (lane, at): (usize, usize)) -> Quantity<'b> {
+    pub(super) fn get<'b>(&'b self, functionals: &'b [Sized], lane: usize, at: usize) -> Quantity<'b> {
         match self {
             Self::Derivatives(derivatives) => Quantity::Derivative(&derivatives[at]),
             Self::Functionals { count, .. } => Quantity::Functional(&functionals[lane * count + at]),

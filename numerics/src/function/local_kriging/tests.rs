@@ -1,4 +1,5 @@
 use super::*;
+use crate::error::NumericsError;
 use crate::function::interpolant::Interpolant;
 use crate::function::posterior::variances;
 use crate::kernel::{Family, Kernel};

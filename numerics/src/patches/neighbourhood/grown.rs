@@ -6,11 +6,7 @@ use super::sheet::Sheet;
 use super::{Batch, Neighbourhood, Scratch, Support};
 use crate::machine::vector::{dot, norm, tangent_basis};
 use crate::points::neighbours::Neighbour;
-
-/// Cosine of 75°, the half angle of an empty sector at a rim.
-const RIM_COSINE: f64 = 0.26;
-/// Distance in units of the radius below which points have no direction.
-const RIM_LEAST: f64 = 0.01;
+use crate::points::patch::is_at_rim;
 
 /// A growing neighbourhood in D dimensions with P terms of the trend.
 pub(super) struct Grown<const D: usize, const P: usize> {
@@ -43,7 +39,8 @@ impl<const D: usize, const P: usize> Grown<D, P> {
         grown.put_into(support, nearest, batch, lane, scratch);
         let radius = grown.radius;
         let frame = grown.frame.as_flattened().iter().copied().collect();
-        let is_at_rim = grown.is_at_rim(scratch);
+        let terms = scratch.terms.as_chunks::<P>().0;
+        let is_at_rim = is_at_rim(terms.iter().map(|terms| &terms[1..D]), D - 1);
         Some(Neighbourhood { frame, radius, is_at_rim })
     }
 
@@ -170,25 +167,6 @@ impl<const D: usize, const P: usize> Grown<D, P> {
         normal.iter_mut().for_each(|n| *n /= length);
         self.frame.as_flattened_mut()[..D * (D - 1)].copy_from_slice(&tangent_basis(&normal));
         self.frame[D - 1] = normal;
-    }
-
-    /// Returns whether the query is at the rim: in the plane, a sector of 150° has no points (see
-    /// [`crate::points`], patches).
-    fn is_at_rim(&self, scratch: &Scratch) -> bool {
-        let terms = scratch.terms.as_chunks::<P>().0;
-        let mut away = [0.0; D];
-        for terms in terms {
-            (0..D - 1).for_each(|a| away[a] -= terms[1 + a]);
-        }
-        let length = norm(&away);
-        let along = |terms: &[f64; P]| (0..D - 1).map(|a| away[a] * terms[1 + a]).sum::<f64>();
-        let size = |terms: &[f64; P]| (0..D - 1).map(|a| terms[1 + a].powi(2)).sum::<f64>().sqrt();
-        // Points closer than a hundredth of the neighbourhood have no reliable direction.
-        length > 0.0
-            && terms
-                .iter()
-                .filter(|terms| size(terms) > RIM_LEAST)
-                .all(|terms| along(terms) < RIM_COSINE * length * size(terms))
     }
 
     fn put_into(

@@ -5,11 +5,11 @@ use std::cmp::Ordering;
 
 use super::grid::{is_on_grid, on_grid};
 use super::{LEAF_SIZE, Neighbours, Node};
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 
-pub(super) fn tree(cloud: &Cloud, observer: &dyn Observer) -> Result<Neighbours, NumericsError> {
+pub(super) fn tree(cloud: &Cloud, observer: &dyn Observer) -> Result<Neighbours> {
     let cloud = cloud_on_grid(cloud)?;
     let cloud = cloud.as_ref();
     let mut order: Vec<u32> = (0..cloud.n_points() as u32).collect();
@@ -29,7 +29,7 @@ pub(super) fn tree(cloud: &Cloud, observer: &dyn Observer) -> Result<Neighbours,
 
 /// Returns the cloud with its coordinates rounded to the grid. Nearly every cloud lies on it already and is
 /// borrowed.
-fn cloud_on_grid(cloud: &Cloud) -> Result<Cow<'_, Cloud>, NumericsError> {
+fn cloud_on_grid(cloud: &Cloud) -> Result<Cow<'_, Cloud>> {
     if is_on_grid(cloud.coordinates()) {
         return Ok(Cow::Borrowed(cloud));
     }
@@ -53,7 +53,7 @@ struct Widest {
 
 impl Builder<'_> {
     /// Appends the nodes of these points. `start` points come before them.
-    fn split(&mut self, order: &mut [u32], start: usize) -> Result<(), NumericsError> {
+    fn split(&mut self, order: &mut [u32], start: usize) -> Result<()> {
         self.observer.checkpoint()?;
         let Widest { axis, extent } = self.widest(order);
         if order.len() <= LEAF_SIZE || extent == 0.0 {

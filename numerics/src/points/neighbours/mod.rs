@@ -7,7 +7,7 @@ mod search;
 mod tests;
 
 use super::cloud::Cloud;
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::machine::heap::vec_bytes;
 use crate::observer::Observer;
 
@@ -65,8 +65,8 @@ impl Neighbours {
     /// reaches.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub fn of(cloud: &Cloud, observer: &dyn Observer) -> Result<Self, NumericsError> {
+    /// `NumericsError::Cancelled`.
+    pub fn of(cloud: &Cloud, observer: &dyn Observer) -> Result<Self> {
         build::tree(cloud, observer)
     }
 

@@ -15,7 +15,7 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef};
 use rayon::prelude::*;
 
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::kernel::Kernel;
 use crate::machine::parallelism::parallelism;
 use crate::machine::vector::dot;
@@ -48,8 +48,8 @@ pub(super) fn is_decomposed(n_points: usize, n_alphas: usize) -> bool {
 /// NaN where `K + αI` is not positive definite in float64. The noise of the hyperparameters is ignored.
 ///
 /// # Errors
-/// [`NumericsError::InvalidRegularization`] for an α that is negative or not finite.
-/// [`NumericsError::LengthMismatch`], [`NumericsError::MeanNotDetermined`], [`NumericsError::Cancelled`].
+/// `NumericsError::InvalidRegularization` for an α that is negative or not finite.
+/// `NumericsError::LengthMismatch`, `NumericsError::MeanNotDetermined`, `NumericsError::Cancelled`.
 /// Also the errors of [`Hyperparameters::kernel_on`].
 pub fn alpha_path(
     (cloud, values, mean): (&Cloud, &[f64], Mean),
@@ -57,7 +57,7 @@ pub fn alpha_path(
     alphas: &[f64],
     criterion: Criterion,
     observer: &dyn Observer,
-) -> Result<Vec<f64>, NumericsError> {
+) -> Result<Vec<f64>> {
     for &alpha in alphas {
         Regularization::uniform(alpha)?;
     }
@@ -76,7 +76,7 @@ fn by_factors(
     alphas: &[f64],
     criterion: Criterion,
     observer: &dyn Observer,
-) -> Result<Vec<f64>, NumericsError> {
+) -> Result<Vec<f64>> {
     let mut evaluator = Evaluator::new(subject, criterion, false);
     let score = |&alpha: &f64| {
         let at = Hyperparameters { noise: Regularization::uniform(alpha)?, ..at.clone() };
@@ -92,11 +92,10 @@ fn by_spectrum(
     alphas: &[f64],
     criterion: Criterion,
     observer: &dyn Observer,
-) -> Result<Vec<f64>, NumericsError> {
-    let cloud = subject.cloud;
-    let kernel = at.kernel_on(cloud)?;
+) -> Result<Vec<f64>> {
+    let kernel = at.kernel_on(subject.cloud)?;
     let is_restricted = criterion.needs_diagonal() && subject.n_functions > 0;
-    let spectrum = Spectrum::of(subject, (cloud, &kernel), is_restricted, observer)?;
+    let spectrum = Spectrum::of(subject, &kernel, is_restricted, observer)?;
     observer.enter(Stage::Evaluate);
     match criterion {
         Criterion::MarginalLikelihood => spectrum.likelihoods(subject, alphas, observer),
@@ -122,7 +121,7 @@ impl Spectrum {
         subject: &Subject<'_>,
         alphas: &[f64],
         observer: &dyn Observer,
-    ) -> Result<Vec<f64>, NumericsError> {
+    ) -> Result<Vec<f64>> {
         let (n, p) = (self.n, subject.n_functions);
         let turned = |function: &[f64]| -> Vec<f64> {
             self.vectors.par_chunks_exact(n).map(|u| dot(u, function)).collect()
@@ -151,7 +150,7 @@ impl Spectrum {
 
     /// Returns the leave-one-out scores, from `P_ii = Σ_k U_ik²/(D_k + α)` and `Λ = U(D + α)⁻¹UᵀY`. Many α
     /// take two matrix products.
-    fn left_out(&self, alphas: &[f64], observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
+    fn left_out(&self, alphas: &[f64], observer: &dyn Observer) -> Result<Vec<f64>> {
         let (n, r) = (self.n, self.eigenvalues.len());
         let squares: Vec<f64> = self.vectors.par_iter().map(|u| u * u).collect();
         let squares = MatRef::from_column_major_slice(&squares, n, r);
@@ -177,7 +176,7 @@ impl Spectrum {
     }
 
     /// Returns the scores of generalised cross-validation, `−n Σ (w UᵀY)²/(Σ w)²` with w = 1/(D + α).
-    fn cross_validations(&self, alphas: &[f64], observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
+    fn cross_validations(&self, alphas: &[f64], observer: &dyn Observer) -> Result<Vec<f64>> {
         let score = |&alpha: &f64| {
             observer.checkpoint()?;
             let Some(inverse) = self.inverse(alpha) else { return Ok(f64::NAN) };

@@ -6,15 +6,14 @@ use faer::linalg::evd::{ComputeEigenvectors, self_adjoint_evd, self_adjoint_evd_
 use faer::{MatMut, MatRef};
 use rayon::prelude::*;
 
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::kernel::Kernel;
 use crate::machine::parallelism::parallelism;
 use crate::machine::vector::dot;
 use crate::observer::{Observer, Stage};
-use crate::points::cloud::Cloud;
 use crate::selection::learning::remove_mean;
 use crate::selection::subject::Subject;
-use crate::sums::gram::fill_lower_gram;
+use crate::sums::gram::{fill_lower_gram, mirror};
 use crate::sums::regularization::Regularization;
 
 /// Least `D_i + α` that is significant, as a multiple of the greatest eigenvalue. Eigenvalues have about this
@@ -39,11 +38,11 @@ impl Spectrum {
     /// [`NumericsError::OutOfMemory`], [`NumericsError::Cancelled`].
     pub(super) fn of(
         subject: &Subject<'_>,
-        (cloud, kernel): (&Cloud, &Kernel),
+        kernel: &Kernel,
         is_restricted: bool,
         observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
-        let n = cloud.n_points();
+    ) -> Result<Self> {
+        let (cloud, n) = (subject.cloud, subject.n_points());
         let mut gram = vec![0.0; n * n];
         observer.enter(Stage::Gram);
         fill_lower_gram(cloud, kernel, &Regularization::Uniform(0.0), &mut gram, n, observer)?;
@@ -80,7 +79,7 @@ impl Spectrum {
 ///
 /// # Errors
 /// [`NumericsError::OutOfMemory`].
-fn decompose(matrix: &[f64], n: usize) -> Result<(Vec<f64>, Vec<f64>), NumericsError> {
+fn decompose(matrix: &[f64], n: usize) -> Result<(Vec<f64>, Vec<f64>)> {
     let (mut eigenvalues, mut vectors) = (vec![0.0; n], vec![0.0; n * n]);
     let par = parallelism((n as f64).powi(3));
     let requirement = self_adjoint_evd_scratch::<f64>(n, ComputeEigenvectors::Yes, par, Default::default());
@@ -100,15 +99,6 @@ fn decompose(matrix: &[f64], n: usize) -> Result<(Vec<f64>, Vec<f64>), NumericsE
         eigenvalues.fill(f64::NAN);
     }
     Ok((eigenvalues, vectors))
-}
-
-/// Copies the lower triangle to the upper one.
-fn mirror(matrix: &mut [f64], n: usize) {
-    for j in 0..n {
-        for i in 0..j {
-            matrix[j * n + i] = matrix[i * n + j];
-        }
-    }
 }
 
 /// Sets the functions of the mean apart: `K ← (I − F̂F̂ᵀ)K(I − F̂F̂ᵀ) − sF̂F̂ᵀ`.

@@ -1,6 +1,7 @@
 //! Paths compared with single evaluations.
 
 use super::*;
+use crate::error::NumericsError;
 use crate::kernel::Family;
 use crate::observer::Unobserved;
 use crate::selection::evaluation::Evaluator;

@@ -8,12 +8,12 @@ use std::ops::Range;
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::kernel::{HUGE, Kernel, Pairs};
 use crate::machine::registers::{BLOCK, Block, Pack};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
-use crate::sums::nodes::Nodes;
+use crate::sums::nodes::{Nodes, PackPlace};
 
 /// Columns per task. The columns of a triangle differ in length, which many tasks balance.
 const COLUMNS_PER_TASK: usize = 16;
@@ -68,34 +68,44 @@ pub(in crate::selection) struct Sums {
     pub(in crate::selection) of_axes: Vec<f64>,
 }
 
-/// Computes the sums for a kernel on a cloud, those of single axes only if `per_axis`. If `is_alone`, all
-/// work stays on the calling thread.
-///
-/// # Errors
-/// [`NumericsError::Cancelled`].
-pub(in crate::selection) fn contract(
-    (cloud, kernel): (&Cloud, &Kernel),
-    weights: &PairWeights<'_>,
-    per_axis: bool,
-    is_alone: bool,
-    observer: &dyn Observer,
-) -> Result<Sums, NumericsError> {
-    let (nodes, n) = (Nodes::of(cloud), cloud.n_points());
-    let task = |task: usize| {
-        observer.checkpoint()?;
-        let columns = task * COLUMNS_PER_TASK..((task + 1) * COLUMNS_PER_TASK).min(n);
-        Ok(nodes.dispatch(Columns { nodes: &nodes, cloud, kernel, weights, columns, per_axis }))
-    };
-    let tasks = 0..n.div_ceil(COLUMNS_PER_TASK);
-    let parts: Result<Vec<Vec<f64>>, NumericsError> =
-        if is_alone { tasks.map(task).collect() } else { tasks.into_par_iter().map(task).collect() };
-    // Adding in the order of the tasks makes the sum independent of the threads.
-    let mut total = vec![0.0; FIXED + if per_axis { cloud.dimension() } else { 0 }];
-    for part in parts? {
-        total.iter_mut().zip(&part).for_each(|(total, part)| *total += part);
+/// The sums to compute for a kernel on a cloud.
+pub(in crate::selection) struct Contraction<'a> {
+    pub(in crate::selection) cloud: &'a Cloud,
+    pub(in crate::selection) kernel: &'a Kernel,
+    pub(in crate::selection) weights: &'a PairWeights<'a>,
+    /// Whether sums of single axes are wanted.
+    pub(in crate::selection) per_axis: bool,
+    /// Whether all work stays on the calling thread.
+    pub(in crate::selection) is_alone: bool,
+}
+
+impl Contraction<'_> {
+    /// Computes the sums.
+    ///
+    /// # Errors
+    /// `NumericsError::Cancelled`.
+    pub(in crate::selection) fn sums(&self, observer: &dyn Observer) -> Result<Sums> {
+        let (nodes, n) = (&Nodes::of(self.cloud), self.cloud.n_points());
+        let task = |task: usize| {
+            observer.checkpoint()?;
+            let columns = task * COLUMNS_PER_TASK..((task + 1) * COLUMNS_PER_TASK).min(n);
+            Ok(nodes.dispatch(Columns { of: self, nodes, columns }))
+        };
+        let tasks = 0..n.div_ceil(COLUMNS_PER_TASK);
+        let parts: Result<Vec<Vec<f64>>> =
+            if self.is_alone { tasks.map(task).collect() } else { tasks.into_par_iter().map(task).collect() };
+        // Adding in the order of the tasks makes the sum independent of the threads.
+        let mut total = vec![0.0; FIXED + self.n_axes()];
+        for part in parts? {
+            total.iter_mut().zip(&part).for_each(|(total, part)| *total += part);
+        }
+        let of_axes = total[FIXED..].iter().map(|sum| sum * self.kernel.inverse_square_length()).collect();
+        Ok(Sums { of_values: total[0], of_slopes: total[1], of_scaled_slopes: total[2], of_axes })
     }
-    let of_axes = total[FIXED..].iter().map(|sum| sum * kernel.inverse_square_length()).collect();
-    Ok(Sums { of_values: total[0], of_slopes: total[1], of_scaled_slopes: total[2], of_axes })
+
+    fn n_axes(&self) -> usize {
+        if self.per_axis { self.cloud.dimension() } else { 0 }
+    }
 }
 
 /// Number of sums besides those of the axes.
@@ -103,12 +113,9 @@ const FIXED: usize = 3;
 
 /// The task that computes the sums over some columns.
 struct Columns<'a> {
+    of: &'a Contraction<'a>,
     nodes: &'a Nodes,
-    cloud: &'a Cloud,
-    kernel: &'a Kernel,
-    weights: &'a PairWeights<'a>,
     columns: Range<usize>,
-    per_axis: bool,
 }
 
 impl WithSimd for Columns<'_> {
@@ -116,16 +123,17 @@ impl WithSimd for Columns<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Vec<f64> {
-        let n_axes = if self.per_axis { self.cloud.dimension() } else { 0 };
-        let mut sums = vec![Block::ZERO; FIXED + n_axes];
-        let (mut differences, mut weights) = (vec![Block::ZERO; n_axes], Block::ZERO);
-        for j in self.columns.clone() {
-            let x = self.cloud.point(j);
-            for block in j / BLOCK..self.cloud.n_points().div_ceil(BLOCK) {
-                self.weights.fill(j, block, &mut weights);
-                self.kernel.profiles(ColumnPairs {
+        let Self { of, nodes, columns } = self;
+        let mut sums = vec![Block::ZERO; FIXED + of.n_axes()];
+        let (mut differences, mut weights) = (vec![Block::ZERO; of.n_axes()], Block::ZERO);
+        for j in columns {
+            let x = of.cloud.point(j);
+            for block in j / BLOCK..of.cloud.n_points().div_ceil(BLOCK) {
+                of.weights.fill(j, block, &mut weights);
+                of.kernel.profiles(ColumnPairs {
                     simd,
-                    of: &self,
+                    nodes,
+                    kernel: of.kernel,
                     block,
                     x,
                     weights: &weights,
@@ -139,9 +147,10 @@ impl WithSimd for Columns<'_> {
 }
 
 /// A block of rows of one column.
-struct ColumnPairs<'a, 'b, S> {
+struct ColumnPairs<'a, S> {
     simd: S,
-    of: &'a Columns<'b>,
+    nodes: &'a Nodes,
+    kernel: &'a Kernel,
     block: usize,
     x: &'a [f64],
     weights: &'a Block,
@@ -149,7 +158,7 @@ struct ColumnPairs<'a, 'b, S> {
     sums: &'a mut [Block],
 }
 
-impl<S: Simd> ColumnPairs<'_, '_, S> {
+impl<S: Simd> ColumnPairs<'_, S> {
     /// Adds `a · b` to a sum, element by element.
     #[inline(always)]
     fn add(&mut self, sum: usize, at: usize, a: Pack<S>, b: Pack<S>) {
@@ -158,21 +167,20 @@ impl<S: Simd> ColumnPairs<'_, '_, S> {
     }
 }
 
-impl<S: Simd> Pairs<S> for ColumnPairs<'_, '_, S> {
+impl<S: Simd> Pairs<S> for ColumnPairs<'_, S> {
     /// The scaled squared distances q.
     type Others = Pack<S>;
 
     #[inline(always)]
     fn pack(&mut self, at: usize) -> (Pack<S>, Pack<S>) {
-        let Columns { nodes, kernel, .. } = *self.of;
-        let at_block = (self.block, at);
+        let place = PackPlace { block: self.block, at };
         let q = if self.differences.is_empty() {
-            nodes.scaled_distances(self.simd, at_block, self.x, kernel, |_, _| ())
+            self.nodes.scaled_distances(self.simd, place, self.x, self.kernel, |_, _| ())
         } else {
             // The closure must stay this small: a larger one is not inlined, which turns every instruction
             // into a call.
             let differences = &mut *self.differences;
-            nodes.scaled_distances(self.simd, at_block, self.x, kernel, |c, difference| {
+            self.nodes.scaled_distances(self.simd, place, self.x, self.kernel, |c, difference| {
                 difference.store(&mut differences[c], at);
             })
         };

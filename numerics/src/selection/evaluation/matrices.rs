@@ -9,7 +9,7 @@ use faer::prelude::ReborrowMut;
 use faer::{Accum, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::kernel::Kernel;
 use crate::machine::parallelism::parallelism;
 use crate::machine::vector::dot;
@@ -81,13 +81,14 @@ impl Matrices {
     /// Factorizes `K + N = LLᵀ`. Returns whether that succeeds in float64.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
+    /// `NumericsError::Cancelled`.
     pub(in crate::selection) fn factorize(
         &mut self,
-        (cloud, kernel): (&Cloud, &Kernel),
+        cloud: &Cloud,
+        kernel: &Kernel,
         noise: &Regularization,
         observer: &dyn Observer,
-    ) -> Result<bool, NumericsError> {
+    ) -> Result<bool> {
         let n = self.n;
         self.has_inverse_factor = false;
         self.factor.resize(n * n, 0.0);
@@ -155,11 +156,8 @@ impl Matrices {
     /// Computes L⁻¹ unless it is there already.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(in crate::selection) fn invert_factor(
-        &mut self,
-        observer: &dyn Observer,
-    ) -> Result<(), NumericsError> {
+    /// `NumericsError::Cancelled`.
+    pub(in crate::selection) fn invert_factor(&mut self, observer: &dyn Observer) -> Result<()> {
         if self.has_inverse_factor {
             return Ok(());
         }
@@ -192,11 +190,8 @@ impl Matrices {
     /// Computes `W = L⁻ᵀL⁻¹`, from L⁻¹.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(in crate::selection) fn multiply_inverse(
-        &mut self,
-        observer: &dyn Observer,
-    ) -> Result<(), NumericsError> {
+    /// `NumericsError::Cancelled`.
+    pub(in crate::selection) fn multiply_inverse(&mut self, observer: &dyn Observer) -> Result<()> {
         let n = self.n;
         self.product.resize(n * n, 0.0);
         let inverse = MatRef::from_column_major_slice(&self.inverse_factor, n, n);
@@ -222,13 +217,13 @@ impl Matrices {
     /// Computes `P diag(c) P` from W, with `P = W − TTᵀ` and c ≥ 0. Overwrites W and L⁻¹.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
+    /// `NumericsError::Cancelled`.
     pub(in crate::selection) fn multiply_columns(
         &mut self,
         of_mean: &[f64],
         c: &[f64],
         observer: &dyn Observer,
-    ) -> Result<(), NumericsError> {
+    ) -> Result<()> {
         let (n, product) = (self.n, &self.product);
         let fill = |(j, column): (usize, &mut [f64])| {
             let root = c[j].sqrt();

@@ -11,7 +11,7 @@ pub(super) mod space;
 
 use faer::Mat;
 
-use crate::error::{NotDefinite, NumericsError};
+use crate::error::{NotDefinite, NumericsError, Result};
 use crate::kernel::Kernel;
 use crate::machine::vector::dot;
 use crate::observer::Observer;
@@ -20,7 +20,7 @@ use crate::selection::learning::remove_mean;
 use crate::selection::parameters::Hyperparameters;
 use crate::selection::subject::{Subject, relative_noise};
 use crate::solver::trend::{Trend, solve_gram};
-use contraction::{PairWeights, contract};
+use contraction::{Contraction, PairWeights};
 use matrices::Matrices;
 use space::Space;
 
@@ -85,11 +85,7 @@ impl<'a> Evaluator<'a> {
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`], and the errors of [`Hyperparameters::kernel_on`].
-    pub(super) fn score(
-        &mut self,
-        at: &Hyperparameters,
-        observer: &dyn Observer,
-    ) -> Result<Option<State>, NumericsError> {
+    pub(super) fn score(&mut self, at: &Hyperparameters, observer: &dyn Observer) -> Result<Option<State>> {
         Ok(self.state(at, observer)?.filter(|state| state.score.is_finite()))
     }
 
@@ -98,13 +94,9 @@ impl<'a> Evaluator<'a> {
     ///
     /// # Errors
     /// Returns the errors of [`Evaluator::score`].
-    pub(super) fn state(
-        &mut self,
-        at: &Hyperparameters,
-        observer: &dyn Observer,
-    ) -> Result<Option<State>, NumericsError> {
+    pub(super) fn state(&mut self, at: &Hyperparameters, observer: &dyn Observer) -> Result<Option<State>> {
         let kernel = at.kernel_on(self.subject.cloud)?;
-        if !self.matrices.factorize((self.subject.cloud, &kernel), &at.noise, observer)? {
+        if !self.matrices.factorize(self.subject.cloud, &kernel, &at.noise, observer)? {
             return Ok(None);
         }
         observer.checkpoint()?;
@@ -144,7 +136,7 @@ impl<'a> Evaluator<'a> {
         at: &Hyperparameters,
         state: &State,
         observer: &dyn Observer,
-    ) -> Result<Vec<f64>, NumericsError> {
+    ) -> Result<Vec<f64>> {
         if space.n_free() == 0 {
             return Ok(Vec::new());
         }
@@ -163,8 +155,14 @@ impl<'a> Evaluator<'a> {
             left: &state.weights,
             right: &right,
         };
-        let kernel = (self.subject.cloud, &state.kernel);
-        let sums = contract(kernel, &weights, space.per_axis(), self.matrices.is_alone, observer)?;
+        let contraction = Contraction {
+            cloud: self.subject.cloud,
+            kernel: &state.kernel,
+            weights: &weights,
+            per_axis: space.per_axis(),
+            is_alone: self.matrices.is_alone,
+        };
+        let sums = contraction.sums(observer)?;
         Ok(space.gradient(at, &sums, weights.trace()))
     }
 
@@ -188,7 +186,7 @@ impl<'a> Evaluator<'a> {
 
     /// Computes `P_ii = W_ii − |T_i|²`, and 0 where that is rounding: no other value then says anything about
     /// the value of the point.
-    fn diagonal(&mut self, of_mean: &[f64], observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
+    fn diagonal(&mut self, of_mean: &[f64], observer: &dyn Observer) -> Result<Vec<f64>> {
         self.matrices.invert_factor(observer)?;
         let n = self.subject.n_points();
         let entry = |(i, of_inverse): (usize, f64)| {

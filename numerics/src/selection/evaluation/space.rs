@@ -1,7 +1,7 @@
 //! The box of logarithms that a search explores.
 
 use super::contraction::Sums;
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::kernel::Family;
 use crate::selection::parameters::{Hyperparameters, Parameter, Variation};
 use crate::sums::regularization::Regularization;
@@ -23,7 +23,7 @@ impl Space {
         base: &Hyperparameters,
         vary: &[Variation],
         dimension: usize,
-    ) -> Result<Self, NumericsError> {
+    ) -> Result<Self> {
         let mut space = Self { base: base.clone(), free: Vec::new() };
         for (entry, &variation) in vary.iter().enumerate() {
             let refuse = |requirement| NumericsError::InvalidVariation { entry, requirement };
@@ -52,7 +52,7 @@ impl Space {
     }
 
     /// Checks that no parameter varies twice, and that ℓ and α are single numbers where they vary as such.
-    fn check_distinct(&self, vary: &[Variation]) -> Result<(), NumericsError> {
+    fn check_distinct(&self, vary: &[Variation]) -> Result<()> {
         let last = vary.len().saturating_sub(1);
         let has_axes = self.base.length_scales.len() > 1 || self.per_axis();
         for (at, free) in self.free.iter().enumerate() {
@@ -91,6 +91,11 @@ impl Space {
     /// Bounds of the logarithms.
     pub(in crate::selection) fn bounds(&self) -> Vec<(f64, f64)> {
         self.free.iter().map(|free| (free.min.ln(), free.max.ln())).collect()
+    }
+
+    /// The family at the start.
+    pub(in crate::selection) fn family(&self) -> Family {
+        self.base.family
     }
 
     /// Logarithms at which the search begins.

@@ -3,8 +3,7 @@
 use super::Learned;
 use super::grid::{Cell, Grid, N_FAMILIES};
 use super::search::Search;
-use crate::error::NumericsError;
-use crate::observer::Observer;
+use crate::error::Result;
 
 /// Largest ratio of the variance of the deep groups to that of all groups.
 const DISAGREEING: f64 = 1.5;
@@ -35,25 +34,21 @@ impl Agreement<'_> {
     /// has a feature that the cell does not expect.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`]. [`NumericsError::WeightsOverflow`] for values whose squares exceed
+    /// `NumericsError::Cancelled`. `NumericsError::WeightsOverflow` for values whose squares exceed
     /// float64.
-    pub(super) fn decided(
-        &mut self,
-        best: [Cell; N_FAMILIES],
-        observer: &dyn Observer,
-    ) -> Result<Option<Learned>, NumericsError> {
-        let best = self.best(best, observer)?;
-        let mut cell = self.all.shortest(best, observer)?;
+    pub(super) fn decided(&mut self, best: [Cell; N_FAMILIES]) -> Result<Option<Learned>> {
+        let best = self.best(best)?;
+        let mut cell = self.all.shortest(best)?;
         let (mut of_groups, mut last) = (None, None);
         loop {
-            if let Some(Verdict { learned, is_of_groups, is_of_places }) = self.verdict(cell, observer)? {
+            if let Some(Verdict { learned, is_of_groups, is_of_places }) = self.verdict(cell)? {
                 match (is_of_groups, is_of_places) {
                     (true, true) => return Ok(Some(learned)),
                     (true, false) if of_groups.is_none() => of_groups = Some(learned),
                     _ => last = Some(learned),
                 }
             }
-            let shorter = self.all.shorter(cell, observer)?;
+            let shorter = self.all.shorter(cell)?;
             let is_local = |cell: &Cell| of_groups.is_none() || self.grid.is_longer_than_outliers(*cell);
             match shorter.filter(is_local) {
                 Some(shorter) => cell = shorter,
@@ -65,10 +60,10 @@ impl Agreement<'_> {
     }
 
     /// Returns the best cell by all groups, the first of equals.
-    fn best(&mut self, cells: [Cell; N_FAMILIES], observer: &dyn Observer) -> Result<Cell, NumericsError> {
+    fn best(&mut self, cells: [Cell; N_FAMILIES]) -> Result<Cell> {
         let mut best = (cells[0], f64::INFINITY);
         for cell in cells {
-            let height = self.height(cell, observer)?;
+            let height = self.height(cell)?;
             if height < best.1 {
                 best = (cell, height);
             }
@@ -76,16 +71,16 @@ impl Agreement<'_> {
         Ok(best.0)
     }
 
-    fn height(&mut self, cell: Cell, observer: &dyn Observer) -> Result<f64, NumericsError> {
-        let of_deep = self.deep.as_mut().map_or(Ok(0.0), |deep| deep.height(cell, observer))?;
-        Ok(self.all.height(cell, observer)? + of_deep)
+    fn height(&mut self, cell: Cell) -> Result<f64> {
+        let of_deep = self.deep.as_mut().map_or(Ok(0.0), |deep| deep.height(cell))?;
+        Ok(self.all.height(cell)? + of_deep)
     }
 
     /// Returns the verdict on a cell, or `None` if it does not explain the values in float64.
-    fn verdict(&mut self, cell: Cell, observer: &dyn Observer) -> Result<Option<Verdict>, NumericsError> {
-        let Some(all) = self.all.score(cell, observer)? else { return Ok(None) };
+    fn verdict(&mut self, cell: Cell) -> Result<Option<Verdict>> {
+        let Some(all) = self.all.score(cell)? else { return Ok(None) };
         let deep = match &mut self.deep {
-            Some(deep) => deep.score(cell, observer)?,
+            Some(deep) => deep.score(cell)?,
             None => Some(all),
         };
         let Some(deep) = deep else { return Ok(None) };

@@ -2,7 +2,7 @@
 
 use super::values::Values;
 use super::{Learned, Noise};
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::kernel::{Family, Kernel};
 
 /// Families from rough to smooth. All have second derivatives, which operators need.
@@ -136,7 +136,7 @@ impl Grid {
     ///
     /// # Errors
     /// [`NumericsError::WeightsOverflow`] for values whose squares exceed float64.
-    pub(super) fn learned(&self, cell: Cell, variance: f64, unit: f64) -> Result<Learned, NumericsError> {
+    pub(super) fn learned(&self, cell: Cell, variance: f64, unit: f64) -> Result<Learned> {
         let ratio = ratio(cell.ratio);
         let variance = self.known_variance(ratio).unwrap_or(in_units(variance, unit));
         if variance > GREATEST_VARIANCE {

@@ -7,7 +7,7 @@ use super::Learned;
 use super::group::{Group, Nugget, Whitened};
 use super::order::{Conditional, PLACE};
 use super::values::Values;
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::kernel::Kernel;
 use crate::machine::vector::dot;
 use crate::observer::Observer;
@@ -101,7 +101,7 @@ impl<'a> Evidence<'a> {
         ratio: f64,
         variance: Option<f64>,
         observer: &dyn Observer,
-    ) -> Result<Option<Score>, NumericsError> {
+    ) -> Result<Option<Score>> {
         let nugget = Nugget { ratio, least: 0.0 };
         let Some(mut left) = self.unexplained(kernel, nugget, observer)? else { return Ok(None) };
         let (n, p, n_lists) = (left.n_rows, self.n_functions(), self.values.n_lists());
@@ -126,7 +126,7 @@ impl<'a> Evidence<'a> {
         kernel: &Kernel,
         decided: Learned,
         observer: &dyn Observer,
-    ) -> Result<Learned, NumericsError> {
+    ) -> Result<Learned> {
         // The least noise does not make the mean worse.
         let nugget = Nugget { ratio: decided.ratio, least: LEAST_RATIO_OF_MEAN };
         match (self.unexplained(kernel, nugget, observer)?, self.values.observed.mean) {
@@ -178,7 +178,7 @@ impl<'a> Evidence<'a> {
         })
     }
 
-    fn trend(&self, left: &Unexplained) -> Result<Trend, NumericsError> {
+    fn trend(&self, left: &Unexplained) -> Result<Trend> {
         let p = self.n_functions();
         let column = |a: usize| &left.columns[a * left.n_rows..][..left.n_rows];
         let gram = Mat::from_fn(p, p, |a, b| dot(column(a), column(b)));
@@ -219,13 +219,12 @@ impl<'a> Evidence<'a> {
         kernel: &Kernel,
         nugget: Nugget,
         observer: &dyn Observer,
-    ) -> Result<Option<Unexplained>, NumericsError> {
+    ) -> Result<Option<Unexplained>> {
         let whitened = |group: &Group| {
             observer.checkpoint()?;
             Ok(group.whitened(kernel, nugget))
         };
-        let whitened: Result<Vec<Option<Whitened>>, NumericsError> =
-            self.groups.par_iter().map(whitened).collect();
+        let whitened: Result<Vec<Option<Whitened>>> = self.groups.par_iter().map(whitened).collect();
         let Some(whitened) = whitened?.into_iter().collect::<Option<Vec<Whitened>>>() else {
             return Ok(None);
         };

@@ -20,7 +20,7 @@ mod price;
 mod search;
 mod values;
 
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::kernel::{Family, Kernel};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
@@ -63,8 +63,8 @@ impl Observed<'_> {
     /// Checks that the values are one or more complete lists.
     ///
     /// # Errors
-    /// [`NumericsError::LengthMismatch`] if there is no list, or an incomplete one.
-    fn check(&self) -> Result<(), NumericsError> {
+    /// `NumericsError::LengthMismatch` if there is no list, or an incomplete one.
+    fn check(&self) -> Result<()> {
         let n = self.cloud.n_points();
         if self.values.len() >= n && self.values.len().is_multiple_of(n) {
             Ok(())
@@ -129,9 +129,9 @@ const LEAST_VALUES: usize = 8;
 /// ```
 ///
 /// # Errors
-/// [`NumericsError::Cancelled`], [`NumericsError::LengthMismatch`], [`NumericsError::MeanNotDetermined`].
-/// [`NumericsError::WeightsOverflow`] for values whose squares exceed float64.
-pub fn learn(observed: Observed<'_>, observer: &dyn Observer) -> Result<Learned, NumericsError> {
+/// `NumericsError::Cancelled`, `NumericsError::LengthMismatch`, `NumericsError::MeanNotDetermined`.
+/// `NumericsError::WeightsOverflow` for values whose squares exceed float64.
+pub fn learn(observed: Observed<'_>, observer: &dyn Observer) -> Result<Learned> {
     observed.check()?;
     let values = Values::of(observed);
     let order = Order::of(&observed, observer)?;
@@ -147,41 +147,33 @@ pub fn learn(observed: Observed<'_>, observer: &dyn Observer) -> Result<Learned,
 }
 
 /// Searches the grid on all values, or on a sample and from there on all values in groups.
-fn search(
-    all: &Evidence<'_>,
-    order: &Order,
-    observer: &dyn Observer,
-) -> Result<Option<Learned>, NumericsError> {
+fn search(all: &Evidence<'_>, order: &Order, observer: &dyn Observer) -> Result<Option<Learned>> {
     let (values, grid) = (all.values, Grid::of(all.values));
     let deep = Evidence::of(values, &order.deep);
     let mut agreement = Agreement {
-        all: Search::new(all, &grid),
-        deep: (!order.deep.is_empty()).then(|| Search::new(&deep, &grid)),
+        all: Search::new(all, &grid, observer),
+        deep: (!order.deep.is_empty()).then(|| Search::new(&deep, &grid, observer)),
         grid: &grid,
         unit: values.unit,
     };
     let best = match order.searched.as_slice() {
         [first, _, ..] => {
             let sample = Evidence::of(values, std::slice::from_ref(first));
-            let mut on_sample = Search::new(&sample, &grid);
-            let Some(best) = on_sample.best(observer)? else { return Ok(None) };
-            let Some(begin) = on_sample.least_of(best.into_iter(), observer)? else { return Ok(None) };
-            Some(agreement.all.best_from(begin, observer)?)
+            let mut on_sample = Search::new(&sample, &grid, observer);
+            let Some(best) = on_sample.best()? else { return Ok(None) };
+            let Some(begin) = on_sample.least_of(best.into_iter())? else { return Ok(None) };
+            Some(agreement.all.best_from(begin)?)
         }
-        _ => agreement.all.best(observer)?,
+        _ => agreement.all.best()?,
     };
-    best.map_or(Ok(None), |best| agreement.decided(best, observer))
+    best.map_or(Ok(None), |best| agreement.decided(best))
 }
 
 /// Finds the mean of values under a given kernel and noise.
 ///
 /// # Errors
-/// [`NumericsError::Cancelled`], [`NumericsError::LengthMismatch`], [`NumericsError::MeanNotDetermined`].
-pub fn learn_mean(
-    observed: Observed<'_>,
-    kernel: &Kernel,
-    observer: &dyn Observer,
-) -> Result<Learned, NumericsError> {
+/// `NumericsError::Cancelled`, `NumericsError::LengthMismatch`, `NumericsError::MeanNotDetermined`.
+pub fn learn_mean(observed: Observed<'_>, kernel: &Kernel, observer: &dyn Observer) -> Result<Learned> {
     observed.check()?;
     let variance = kernel.variance();
     let ratio = match observed.noise {

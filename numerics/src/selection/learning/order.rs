@@ -10,7 +10,7 @@
 //! has a kink.
 
 use super::Observed;
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::observer::Observer;
 use crate::points::cells::{Cells, mean};
 use crate::points::cloud::Cloud;
@@ -72,8 +72,8 @@ impl Order {
     /// Orders the points. The first group is a sample, unless all points form one group.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(super) fn of(observed: &Observed<'_>, observer: &dyn Observer) -> Result<Self, NumericsError> {
+    /// `NumericsError::Cancelled`.
+    pub(super) fn of(observed: &Observed<'_>, observer: &dyn Observer) -> Result<Self> {
         let (cloud, n) = (observed.cloud, observed.cloud.n_points());
         if n <= MAX_TOGETHER {
             let halves = halves(observed, &[]);

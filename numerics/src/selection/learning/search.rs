@@ -2,7 +2,7 @@
 
 use super::grid::{Cell, Grid, N_CELLS, N_FAMILIES, Step, along_ridge};
 use super::likelihood::{Evidence, Score};
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::observer::Observer;
 
 /// Steps of a search from nothing, in ratios. Steps in length scales are half as long.
@@ -21,29 +21,27 @@ const AS_LIKELY: f64 = 1.0;
 pub(super) struct Search<'a> {
     evidence: &'a Evidence<'a>,
     grid: &'a Grid,
+    observer: &'a dyn Observer,
     scores: Vec<Option<Option<Score>>>,
 }
 
 impl<'a> Search<'a> {
-    pub(super) fn new(evidence: &'a Evidence<'a>, grid: &'a Grid) -> Self {
-        Self { evidence, grid, scores: vec![None; N_CELLS] }
+    pub(super) fn new(evidence: &'a Evidence<'a>, grid: &'a Grid, observer: &'a dyn Observer) -> Self {
+        Self { evidence, grid, observer, scores: vec![None; N_CELLS] }
     }
 
     /// Finds the best cell of each family. `None` if no kernel explains the values in float64.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(super) fn best(
-        &mut self,
-        observer: &dyn Observer,
-    ) -> Result<Option<[Cell; N_FAMILIES]>, NumericsError> {
-        let Some(mut from) = self.least_of(self.grid.beginnings(), observer)? else { return Ok(None) };
+    /// `NumericsError::Cancelled`.
+    pub(super) fn best(&mut self) -> Result<Option<[Cell; N_FAMILIES]>> {
+        let Some(mut from) = self.least_of(self.grid.beginnings())? else { return Ok(None) };
         let mut best = [from; N_FAMILIES];
         for (family, best) in best.iter_mut().enumerate() {
-            from = self.descend(self.grid.of_family(from, family), &STRIDES, observer)?;
-            if family == 0 && self.is_mostly_noise(from, observer)? {
-                let rough = self.descend(self.grid.rough(family), &STRIDES, observer)?;
-                from = self.least_of([from, rough].into_iter(), observer)?.unwrap_or(from);
+            from = self.descend(self.grid.of_family(from, family), &STRIDES)?;
+            if family == 0 && self.is_mostly_noise(from)? {
+                let rough = self.descend(self.grid.rough(family), &STRIDES)?;
+                from = self.least_of([from, rough].into_iter())?.unwrap_or(from);
             }
             *best = from;
         }
@@ -54,16 +52,12 @@ impl<'a> Search<'a> {
     /// Finds the best cell of each family near one that was found on some of the values.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(super) fn best_from(
-        &mut self,
-        found: Cell,
-        observer: &dyn Observer,
-    ) -> Result<[Cell; N_FAMILIES], NumericsError> {
-        let first = self.descend(found, &FINE, observer)?;
+    /// `NumericsError::Cancelled`.
+    pub(super) fn best_from(&mut self, found: Cell) -> Result<[Cell; N_FAMILIES]> {
+        let first = self.descend(found, &FINE)?;
         let mut best = [first; N_FAMILIES];
         for (family, best) in best.iter_mut().enumerate().filter(|(family, _)| *family != first.family) {
-            *best = self.descend(self.grid.of_family(first, family), &FINE, observer)?;
+            *best = self.descend(self.grid.of_family(first, family), &FINE)?;
         }
         Ok(best)
     }
@@ -74,12 +68,12 @@ impl<'a> Search<'a> {
     /// length scale open, the best one is mostly too long. The noise is the likeliest for the length scale.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(super) fn shortest(&mut self, best: Cell, observer: &dyn Observer) -> Result<Cell, NumericsError> {
-        let most = self.height(best, observer)? + AS_LIKELY;
+    /// `NumericsError::Cancelled`.
+    pub(super) fn shortest(&mut self, best: Cell) -> Result<Cell> {
+        let most = self.height(best)? + AS_LIKELY;
         let mut found = best;
-        while let Some(next) = self.shorter(found, observer)? {
-            if self.height(next, observer)? > most {
+        while let Some(next) = self.shorter(found)? {
+            if self.height(next)? > most {
                 break;
             }
             found = next;
@@ -90,37 +84,29 @@ impl<'a> Search<'a> {
     /// Finds the next shorter length scale with the likeliest noise for it, if there is one.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(super) fn shorter(
-        &mut self,
-        cell: Cell,
-        observer: &dyn Observer,
-    ) -> Result<Option<Cell>, NumericsError> {
+    /// `NumericsError::Cancelled`.
+    pub(super) fn shorter(&mut self, cell: Cell) -> Result<Option<Cell>> {
         let straight = self.grid.moved(cell, Step { lengths: -1, ratios: 0 });
         let along = self.grid.moved(cell, along_ridge(cell.family, -1));
-        match self.least_of(straight.into_iter().chain(along), observer)? {
-            Some(from) => self.line(from, Step { lengths: 0, ratios: 1 }, observer).map(Some),
+        match self.least_of(straight.into_iter().chain(along))? {
+            Some(from) => self.line(from, Step { lengths: 0, ratios: 1 }).map(Some),
             None => Ok(None),
         }
     }
 
-    fn is_mostly_noise(&mut self, cell: Cell, observer: &dyn Observer) -> Result<bool, NumericsError> {
-        let Some(score) = self.score(cell, observer)? else { return Ok(false) };
+    fn is_mostly_noise(&mut self, cell: Cell) -> Result<bool> {
+        let Some(score) = self.score(cell)? else { return Ok(false) };
         Ok(self.against_noise(cell, score) > 0.0)
     }
 
     /// Returns the cell of the least height, the first of equals.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(super) fn least_of(
-        &mut self,
-        cells: impl Iterator<Item = Cell>,
-        observer: &dyn Observer,
-    ) -> Result<Option<Cell>, NumericsError> {
+    /// `NumericsError::Cancelled`.
+    pub(super) fn least_of(&mut self, cells: impl Iterator<Item = Cell>) -> Result<Option<Cell>> {
         let mut best = None;
         for cell in cells {
-            let height = self.height(cell, observer)?;
+            let height = self.height(cell)?;
             if best.is_none_or(|(_, least)| height < least) {
                 best = Some((cell, height));
             }
@@ -129,12 +115,7 @@ impl<'a> Search<'a> {
     }
 
     /// Moves in every direction that gains, with one stride after the other.
-    fn descend(
-        &mut self,
-        mut at: Cell,
-        strides: &[isize],
-        observer: &dyn Observer,
-    ) -> Result<Cell, NumericsError> {
+    fn descend(&mut self, mut at: Cell, strides: &[isize]) -> Result<Cell> {
         for &stride in strides {
             let lengths = (stride + 1) / 2;
             let across = [Step { lengths: 0, ratios: stride }, Step { lengths, ratios: 0 }];
@@ -143,7 +124,7 @@ impl<'a> Search<'a> {
             while is_moving {
                 is_moving = false;
                 for direction in directions {
-                    let next = self.line(at, direction, observer)?;
+                    let next = self.line(at, direction)?;
                     is_moving |= next != at;
                     at = next;
                 }
@@ -153,11 +134,11 @@ impl<'a> Search<'a> {
     }
 
     /// Moves along a direction or against it as long as that gains. Steps double while they gain.
-    fn line(&mut self, begin: Cell, direction: Step, observer: &dyn Observer) -> Result<Cell, NumericsError> {
+    fn line(&mut self, begin: Cell, direction: Step) -> Result<Cell> {
         for sign in [1, -1] {
             let (mut at, mut factor) = (begin, sign);
             while let Some(next) = self.grid.moved(at, direction.times(factor)) {
-                if self.height(next, observer)? >= self.height(at, observer)? - GAIN {
+                if self.height(next)? >= self.height(at)? - GAIN {
                     break;
                 }
                 at = next;
@@ -174,9 +155,9 @@ impl<'a> Search<'a> {
     /// does not explain the values in float64.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(super) fn height(&mut self, cell: Cell, observer: &dyn Observer) -> Result<f64, NumericsError> {
-        let Some(score) = self.score(cell, observer)? else { return Ok(f64::INFINITY) };
+    /// `NumericsError::Cancelled`.
+    pub(super) fn height(&mut self, cell: Cell) -> Result<f64> {
+        let Some(score) = self.score(cell)? else { return Ok(f64::INFINITY) };
         Ok(score.negative_log + self.against_noise(cell, score))
     }
 
@@ -187,19 +168,15 @@ impl<'a> Search<'a> {
     /// Returns the score of a cell. `None` if it does not explain the values in float64.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(super) fn score(
-        &mut self,
-        cell: Cell,
-        observer: &dyn Observer,
-    ) -> Result<Option<Score>, NumericsError> {
+    /// `NumericsError::Cancelled`.
+    pub(super) fn score(&mut self, cell: Cell) -> Result<Option<Score>> {
         if let Some(known) = self.scores[cell.slot()] {
             return Ok(known);
         }
         let found = match self.grid.kernel(cell) {
             Some((kernel, ratio)) => {
                 let variance = self.grid.variance(cell, self.evidence.values.unit);
-                self.evidence.score(&kernel, ratio, variance, observer)?
+                self.evidence.score(&kernel, ratio, variance, self.observer)?
             }
             None => None,
         };

@@ -11,21 +11,16 @@ use std::cell::RefCell;
 
 use slsqp::{Func, StopTols, minimize};
 
-use super::walk::{Best, Walk};
-use crate::error::NumericsError;
+use super::walk::{Found, Walk, free_slopes, near};
+use crate::error::Result;
 use crate::observer::Observer;
 use crate::selection::evaluation::Evaluator;
 use crate::selection::evaluation::space::Space;
-use crate::selection::parameters::Hyperparameters;
 
 /// Least gain of a step, in log likelihood, below which a first descent ends. [`LAST_GAIN`] ends the last
 /// one.
 const LEAST_GAIN: f64 = 1e-6;
 const LAST_GAIN: f64 = 1e-8;
-
-/// Largest slope of a log likelihood by a logarithm that counts as none. What is left to gain is of the order
-/// of its square.
-const FLAT: f64 = 1e-2;
 
 /// Largest slope that is not followed.
 const LEAST_SLOPE: f64 = 1e-6;
@@ -40,33 +35,19 @@ const PROBE: f64 = 0.05;
 /// hundred.
 const LEAST_CURVATURE: f64 = 1e-7;
 
-/// Relative distance to a bound within which a number is at the bound.
-const AT_BOUND: f64 = 1e-9;
-
-/// The end of a descent.
-#[derive(Debug, Clone)]
-pub(super) struct Found {
-    pub(super) logarithms: Vec<f64>,
-    pub(super) hyperparameters: Hyperparameters,
-    pub(super) score: f64,
-    /// Derivatives of the score by the logarithms.
-    pub(super) gradient: Vec<f64>,
-    pub(super) converged: bool,
-}
-
 /// Ascends the criterion from these logarithms. Returns the end of the ascent and the number of evaluations,
 /// which `max_evaluations` limits. The end is `None` if the matrix is not positive definite at the start, or
 /// if no solver would serve the start.
 ///
 /// # Errors
-/// [`NumericsError::Cancelled`], and the errors of [`Hyperparameters::kernel_on`].
+/// `NumericsError::Cancelled`, and the errors of [`Hyperparameters::kernel_on`].
 pub(super) fn descend(
     evaluator: &mut Evaluator<'_>,
     space: &Space,
     start: &[f64],
     max_evaluations: usize,
     observer: &dyn Observer,
-) -> Result<(Option<Found>, usize), NumericsError> {
+) -> Result<(Option<Found>, usize)> {
     let mut walk = Walk::new(evaluator, space, observer);
     if walk.merit(start)?.is_none() {
         return Ok((None, walk.evaluations));
@@ -79,7 +60,7 @@ pub(super) fn descend(
     let left = max_evaluations.saturating_sub(walk.evaluations);
     let walk = run(walk, start, &bounds, left, LEAST_GAIN)?;
     let evaluations = walk.evaluations;
-    Ok((walk.end(start)?.map(|best| found(best, &bounds)), evaluations))
+    Ok((walk.end(start, &bounds)?, evaluations))
 }
 
 /// Ascends further from the end of a descent, in units of curvatures. Leaves the evaluator at the result.
@@ -92,7 +73,7 @@ pub(super) fn finish(
     from: Found,
     max_evaluations: usize,
     observer: &dyn Observer,
-) -> Result<(Found, usize), NumericsError> {
+) -> Result<(Found, usize)> {
     let (bounds, start) = (space.bounds(), from.logarithms.clone());
     let mut walk = Walk::new(evaluator, space, observer);
     let mut merit = walk.merit(&start)?.unwrap_or(f64::NEG_INFINITY);
@@ -116,18 +97,13 @@ pub(super) fn finish(
         merit = best;
     }
     let evaluations = walk.evaluations;
-    Ok((walk.end(&start)?.map_or(from, |best| found(best, &bounds)), evaluations))
+    Ok((walk.end(&start, &bounds)?.unwrap_or(from), evaluations))
 }
 
 /// Returns a unit for each logarithm, `1/√|h|`, in which the curvature at an optimum is 1. The curvature h
 /// comes from differences of slopes. Its magnitude is at least that of the slope, for numbers that tend to
 /// infinity.
-fn units(
-    walk: &mut Walk<'_, '_>,
-    at: &[f64],
-    slopes: &[f64],
-    bounds: &[(f64, f64)],
-) -> Result<Vec<f64>, NumericsError> {
+fn units(walk: &mut Walk<'_, '_>, at: &[f64], slopes: &[f64], bounds: &[(f64, f64)]) -> Result<Vec<f64>> {
     let mut units = Vec::with_capacity(at.len());
     for (k, &(min, max)) in bounds.iter().enumerate() {
         let mut probe = at.to_vec();
@@ -149,7 +125,7 @@ fn run<'a, 'b>(
     bounds: &[(f64, f64)],
     max_evaluations: usize,
     least_gain: f64,
-) -> Result<Walk<'a, 'b>, NumericsError> {
+) -> Result<Walk<'a, 'b>> {
     if from.is_empty() || max_evaluations == 0 {
         return Ok(walk);
     }
@@ -170,26 +146,6 @@ fn run<'a, 'b>(
     }
 }
 
-fn found(best: Best, bounds: &[(f64, f64)]) -> Found {
-    let Best { logarithms, hyperparameters, score, gradient, slopes } = best;
-    let converged = free_slopes(&logarithms, &slopes, bounds).all(|slope| slope.abs() <= FLAT);
-    Found { logarithms, hyperparameters, score, gradient, converged }
-}
-
-/// Slopes that can be followed. They are 0 where a number is at a bound and would move beyond it.
-fn free_slopes<'a>(
-    x: &'a [f64],
-    slopes: &'a [f64],
-    bounds: &'a [(f64, f64)],
-) -> impl Iterator<Item = f64> + 'a {
-    // If the bounds are equal, the number is at both.
-    x.iter().zip(slopes).zip(bounds).map(|((&x, &slope), &(min, max))| match slope {
-        _ if slope > 0.0 && max - x <= near(x) => 0.0,
-        _ if slope < 0.0 && x - min <= near(x) => 0.0,
-        _ => slope,
-    })
-}
-
 /// The bound of its range that a number has reached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
@@ -198,15 +154,10 @@ pub enum Side {
 }
 
 /// Returns the bound that a number is at.
-pub(super) fn side(x: f64, (min, max): (f64, f64)) -> Option<Side> {
+pub(super) fn side(x: f64, min: f64, max: f64) -> Option<Side> {
     match x {
         _ if x - min <= near(x) => Some(Side::Min),
         _ if max - x <= near(x) => Some(Side::Max),
         _ => None,
     }
-}
-
-/// Distance to a bound within which a number is at it.
-fn near(x: f64) -> f64 {
-    AT_BOUND * (1.0 + x.abs())
 }

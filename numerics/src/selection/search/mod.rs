@@ -6,7 +6,7 @@ mod walk;
 
 use rayon::prelude::*;
 
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::kernel::Family;
 use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
@@ -17,7 +17,8 @@ use crate::selection::parameters::{Hyperparameters, Parameter, Variation};
 use crate::selection::subject::Subject;
 use crate::solver::trend::{Mean, Trend};
 pub use descent::Side;
-use descent::{Found, descend, finish, side};
+use descent::{descend, finish, side};
+use walk::Found;
 
 /// Usual limit of evaluations of one descent.
 pub const MAX_EVALUATIONS: usize = 200;
@@ -82,7 +83,7 @@ pub struct Selected {
 /// [`NumericsError::MeanNotDetermined`], for leave-one-out also if the mean is not determined without one of
 /// the points. [`NumericsError::NotPositiveDefinite`] if the matrix is not positive definite at any start.
 /// [`NumericsError::Cancelled`], and the errors of [`Hyperparameters::kernel_on`].
-pub fn select(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Selected, NumericsError> {
+pub fn select(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Selected> {
     let Selection { cloud, vary, start, .. } = *selection;
     let subject = Subject::of(cloud, selection.values, selection.mean)?;
     start.noise.check_matches(cloud)?;
@@ -102,11 +103,11 @@ pub fn select(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Sele
     observer.enter(Stage::Factor);
     let jobs: Vec<(&Space, Vec<f64>)> = spaces.iter().flat_map(|space| starts(space, selection)).collect();
     let ended = run_all(&subject, selection, &jobs, observer)?;
-    best_of(&subject, selection, (families, &spaces), ended, observer)
+    best_of(&subject, selection, &spaces, ended, observer)
 }
 
 /// Refuses a varying ε unless one of the families has it.
-fn check_epsilon(families: &[Family], vary: &[Variation]) -> Result<(), NumericsError> {
+fn check_epsilon(families: &[Family], vary: &[Variation]) -> Result<()> {
     let has_epsilon = families.iter().any(|family| matches!(family, Family::Laplace { .. }));
     match vary.iter().position(|variation| variation.parameter == Parameter::Epsilon) {
         Some(entry) if !has_epsilon => {
@@ -153,7 +154,7 @@ fn run_all(
     selection: &Selection<'_>,
     jobs: &[(&Space, Vec<f64>)],
     observer: &dyn Observer,
-) -> Result<Vec<(Option<Found>, usize)>, NumericsError> {
+) -> Result<Vec<(Option<Found>, usize)>> {
     let is_alone = jobs.len() > 1 && subject.n_points() <= SIDE_BY_SIDE;
     let evaluator = || Evaluator::new(subject, selection.criterion, is_alone);
     let job = |evaluator: &mut Evaluator<'_>, (space, start): &(&Space, Vec<f64>)| {
@@ -171,13 +172,13 @@ fn run_all(
 fn best_of(
     subject: &Subject<'_>,
     selection: &Selection<'_>,
-    (families, spaces): (&[Family], &[Space]),
+    spaces: &[Space],
     ended: Vec<(Option<Found>, usize)>,
     observer: &dyn Observer,
-) -> Result<Selected, NumericsError> {
+) -> Result<Selected> {
     let mut evaluations: usize = ended.iter().map(|(_, evaluations)| evaluations).sum();
-    let per_family = ended.len() / families.len();
-    let mut scores = vec![None; families.len()];
+    let per_family = ended.len() / spaces.len();
+    let mut scores = vec![None; spaces.len()];
     let mut best: Option<(usize, Found, usize)> = None;
     for (at, (found, used)) in ended.into_iter().enumerate() {
         let Some(found) = found else { continue };
@@ -197,7 +198,7 @@ fn best_of(
     let (found, used) = finish(&mut evaluator, space, found, left, observer)?;
     evaluations += used;
     scores[family] = Some(found.score);
-    let sides = found.logarithms.iter().zip(space.bounds()).map(|(&x, bounds)| side(x, bounds));
+    let sides = found.logarithms.iter().zip(space.bounds()).map(|(&x, (min, max))| side(x, min, max));
     Ok(Selected {
         free: space.parameters().zip(sides).collect(),
         hyperparameters: found.hyperparameters,
@@ -206,7 +207,7 @@ fn best_of(
         evaluations,
         converged: found.converged,
         trend: evaluator.trend(),
-        families: families.iter().copied().zip(scores).collect(),
+        families: spaces.iter().map(Space::family).zip(scores).collect(),
     })
 }
 

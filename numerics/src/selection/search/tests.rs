@@ -27,8 +27,8 @@ fn vary(parameters: &[Parameter], min: f64, max: f64) -> Vec<Variation> {
 }
 
 fn selection<'a>(
-    (cloud, values): (&'a Cloud, &'a [f64]),
-    criterion: Criterion,
+    cloud: &'a Cloud,
+    values: &'a [f64],
     start: &'a Hyperparameters,
     vary: &'a [Variation],
 ) -> Selection<'a> {
@@ -36,7 +36,7 @@ fn selection<'a>(
         cloud,
         values,
         mean: Mean::Zero,
-        criterion,
+        criterion: Criterion::MarginalLikelihood,
         start,
         vary,
         families: &[],
@@ -55,7 +55,7 @@ fn nothing_on_a_fine_grid_is_better_than_the_optimum() {
     let start = start(0.5, 0.1);
     let vary = vary(&[Parameter::LengthScale, Parameter::Alpha], 1e-3, 1e2);
     for criterion in CRITERIA {
-        let asked = selection((&cloud, &values), criterion, &start, &vary);
+        let asked = Selection { criterion, ..selection(&cloud, &values, &start, &vary) };
         let found = select(&Selection { restarts: 4, ..asked }, &Unobserved).unwrap();
         assert!(found.converged, "{criterion:?}: {found:?}");
         let mut best = f64::NEG_INFINITY;
@@ -63,7 +63,8 @@ fn nothing_on_a_fine_grid_is_better_than_the_optimum() {
             for j in 0..60 {
                 let at = |k: i32| 1e-3 * 1e5f64.powf(f64::from(k) / 59.0);
                 let here = self::start(at(i), at(j));
-                let score = select(&selection((&cloud, &values), criterion, &here, &[]), &Unobserved);
+                let asked = Selection { criterion, ..selection(&cloud, &values, &here, &[]) };
+                let score = select(&asked, &Unobserved);
                 if let Ok(found) = score {
                     assert!(found.gradient.is_empty() && found.evaluations == 1);
                     best = best.max(found.score);
@@ -81,7 +82,7 @@ fn at_an_optimum_within_the_bounds_there_is_no_slope() {
     let start = start(0.3, 0.1);
     let vary = vary(&[Parameter::LengthScale, Parameter::Variance, Parameter::Alpha], 1e-4, 1e3);
     for criterion in [Criterion::MarginalLikelihood, Criterion::LeaveOneOut] {
-        let asked = selection((&cloud, &values), criterion, &start, &vary);
+        let asked = Selection { criterion, ..selection(&cloud, &values, &start, &vary) };
         let found = select(&asked, &Unobserved).unwrap();
         assert!(found.free.iter().all(|(_, side)| side.is_none()), "{found:?}");
         assert!(found.gradient.iter().all(|slope| slope.abs() < 0.01), "{found:?}");
@@ -97,7 +98,7 @@ fn bounds_hold_and_are_named_where_they_matter() {
         Variation { parameter: Parameter::Alpha, min: 0.5, max: 2.0 },
         Variation { parameter: Parameter::LengthScale, min: 0.1, max: 10.0 },
     ];
-    let asked = selection((&cloud, &values), Criterion::MarginalLikelihood, &start, &vary);
+    let asked = selection(&cloud, &values, &start, &vary);
     let found = select(&asked, &Unobserved).unwrap();
     assert_eq!(found.hyperparameters.noise, Regularization::Uniform(0.5));
     assert_eq!(found.free[0], (Parameter::Alpha, Some(Side::Min)));
@@ -112,7 +113,7 @@ fn restarts_find_the_better_of_two_modes() {
     let cloud = Cloud::new(points, 1).unwrap();
     let start = start(50.0, 1.0);
     let vary = vary(&[Parameter::LengthScale, Parameter::Alpha], 1e-2, 1e2);
-    let asked = selection((&cloud, &values), Criterion::MarginalLikelihood, &start, &vary);
+    let asked = selection(&cloud, &values, &start, &vary);
     let alone = select(&asked, &Unobserved).unwrap();
     let found = select(&Selection { restarts: 8, ..asked }, &Unobserved).unwrap();
     assert!(found.score > alone.score + 1.0, "{} against {}", found.score, alone.score);
@@ -127,7 +128,7 @@ fn the_best_family_wins_and_all_are_scored() {
     let parameters = [Parameter::LengthScale, Parameter::Variance, Parameter::Alpha, Parameter::Epsilon];
     let vary = vary(&parameters, 1e-3, 1e2);
     let families = [Family::Matern { order: 0 }, Family::Laplace { epsilon: 0.1 }, Family::Gauss];
-    let asked = selection((&cloud, &values), Criterion::MarginalLikelihood, &start, &vary);
+    let asked = selection(&cloud, &values, &start, &vary);
     let found = select(&Selection { families: &families, ..asked }, &Unobserved).unwrap();
     assert_eq!(found.families.len(), 3);
     let scores: Vec<f64> = found.families.iter().map(|(_, score)| score.unwrap()).collect();
@@ -144,7 +145,7 @@ fn axes_that_do_not_matter_get_long_length_scales() {
     let start = start(0.5, 0.05);
     let mut vary = vary(&[Parameter::LengthScales], 1e-2, 1e2);
     vary.push(Variation { parameter: Parameter::Alpha, min: 1e-6, max: 1.0 });
-    let asked = selection((&cloud, &values), Criterion::MarginalLikelihood, &start, &vary);
+    let asked = selection(&cloud, &values, &start, &vary);
     let found = select(&asked, &Unobserved).unwrap();
     let scales = &found.hyperparameters.length_scales;
     assert!(scales[0] < 1.0 && scales[1] > 5.0 && scales[2] > 5.0, "{scales:?}");
@@ -156,7 +157,9 @@ fn searches_that_make_no_sense_are_refused() {
     let (cloud, values) = line(10, &mut Random(10));
     let start = start(0.5, 0.05);
     let refused = |vary: &[Variation]| {
-        select(&selection((&cloud, &values), Criterion::LeaveOneOut, &start, vary), &Unobserved).unwrap_err()
+        let criterion = Criterion::LeaveOneOut;
+        let asked = Selection { criterion, ..selection(&cloud, &values, &start, vary) };
+        select(&asked, &Unobserved).unwrap_err()
     };
     let one = |parameter, min, max| Variation { parameter, min, max };
     for (vary, entry) in [
@@ -190,7 +193,8 @@ fn a_cancelled_search_stops() {
     let vary = vary(&[Parameter::LengthScale, Parameter::Variance, Parameter::Alpha], 1e-4, 1e3);
     for looks in [0, 3, 40, 100] {
         for restarts in [0, 5] {
-            let asked = selection((&cloud, &values), Criterion::LeaveOneOut, &start, &vary);
+            let asked =
+                Selection { criterion: Criterion::LeaveOneOut, ..selection(&cloud, &values, &start, &vary) };
             let observer = Impatient(AtomicUsize::new(looks));
             let found = select(&Selection { restarts, ..asked }, &observer);
             assert_eq!(found.unwrap_err(), NumericsError::Cancelled);
@@ -203,7 +207,7 @@ fn evaluations_are_bounded() {
     let (cloud, values) = line(60, &mut Random(12));
     let start = start(5.0, 1.0);
     let vary = vary(&[Parameter::LengthScale, Parameter::Variance, Parameter::Alpha], 1e-4, 1e3);
-    let asked = selection((&cloud, &values), Criterion::MarginalLikelihood, &start, &vary);
+    let asked = selection(&cloud, &values, &start, &vary);
     let found = select(&Selection { max_evaluations: 5, ..asked }, &Unobserved).unwrap();
     assert!(found.evaluations <= 7 && !found.converged, "{found:?}");
 }

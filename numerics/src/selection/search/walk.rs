@@ -1,10 +1,28 @@
 //! The objective that an optimizer sees.
 
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::observer::Observer;
 use crate::selection::evaluation::space::Space;
 use crate::selection::evaluation::{Evaluator, State};
 use crate::selection::parameters::Hyperparameters;
+
+/// Largest slope of a log likelihood by a logarithm that counts as none. What is left to gain is of the order
+/// of its square.
+const FLAT: f64 = 1e-2;
+
+/// Relative distance to a bound within which a number is at the bound.
+const AT_BOUND: f64 = 1e-9;
+
+/// The end of a descent.
+#[derive(Debug, Clone)]
+pub(super) struct Found {
+    pub(super) logarithms: Vec<f64>,
+    pub(super) hyperparameters: Hyperparameters,
+    pub(super) score: f64,
+    /// Derivatives of the score by the logarithms.
+    pub(super) gradient: Vec<f64>,
+    pub(super) converged: bool,
+}
 
 /// The objective for slsqp: −scale · merit over log-hyperparameters divided by `units`.
 pub(super) struct Walk<'a, 'b> {
@@ -65,7 +83,7 @@ impl<'a, 'b> Walk<'a, 'b> {
         }
     }
 
-    fn evaluate(&mut self, x: &[f64], gradient: Option<&mut [f64]>) -> Result<f64, NumericsError> {
+    fn evaluate(&mut self, x: &[f64], gradient: Option<&mut [f64]>) -> Result<f64> {
         let mut slopes = vec![0.0; x.len()];
         let mut value = 0.0;
         if self.error.is_none() {
@@ -85,7 +103,7 @@ impl<'a, 'b> Walk<'a, 'b> {
     }
 
     /// Returns the merit at a point, or `None` if no solver serves it.
-    pub(super) fn merit(&mut self, x: &[f64]) -> Result<Option<f64>, NumericsError> {
+    pub(super) fn merit(&mut self, x: &[f64]) -> Result<Option<f64>> {
         if self.at.as_ref().is_none_or(|at| at.logarithms != x) {
             self.observer.checkpoint()?;
             let hyperparameters = self.space.at(x);
@@ -104,7 +122,7 @@ impl<'a, 'b> Walk<'a, 'b> {
     }
 
     /// Returns the slopes of the merit at a point.
-    pub(super) fn slopes(&mut self, x: &[f64]) -> Result<Vec<f64>, NumericsError> {
+    pub(super) fn slopes(&mut self, x: &[f64]) -> Result<Vec<f64>> {
         self.merit(x)?;
         let (criterion, n) = (self.evaluator.criterion(), self.evaluator.n_points());
         let Some(Point { hyperparameters, state: Some(state), gradient, .. }) = &mut self.at else {
@@ -124,26 +142,34 @@ impl<'a, 'b> Walk<'a, 'b> {
         self.best.as_ref().map_or_else(|| start.to_vec(), |best| best.0.clone())
     }
 
-    /// Returns the best point with its score and the slopes of score and merit, or `None` if there is none.
-    /// Leaves the evaluator there.
-    pub(super) fn end(mut self, start: &[f64]) -> Result<Option<Best>, NumericsError> {
+    /// Returns the best point within these bounds, or `None` if there is none. Leaves the evaluator there.
+    pub(super) fn end(mut self, start: &[f64], bounds: &[(f64, f64)]) -> Result<Option<Found>> {
         let logarithms = self.best_logarithms(start);
         let slopes = self.slopes(&logarithms)?;
         let Some(Point { hyperparameters, state: Some(state), gradient, .. }) = self.at else {
             return Ok(None);
         };
         let (score, gradient) = (state.score, gradient.unwrap_or_default());
-        Ok(Some(Best { logarithms, hyperparameters, score, gradient, slopes }))
+        let converged = free_slopes(&logarithms, &slopes, bounds).all(|slope| slope.abs() <= FLAT);
+        Ok(Some(Found { logarithms, hyperparameters, score, gradient, converged }))
     }
 }
 
-/// The best point of a walk.
-pub(super) struct Best {
-    pub(super) logarithms: Vec<f64>,
-    pub(super) hyperparameters: Hyperparameters,
-    pub(super) score: f64,
-    /// Derivatives of the score.
-    pub(super) gradient: Vec<f64>,
-    /// Derivatives of the merit.
-    pub(super) slopes: Vec<f64>,
+/// Slopes that can be followed. They are 0 where a number is at a bound and would move beyond it.
+pub(super) fn free_slopes<'a>(
+    x: &'a [f64],
+    slopes: &'a [f64],
+    bounds: &'a [(f64, f64)],
+) -> impl Iterator<Item = f64> + 'a {
+    // If the bounds are equal, the number is at both.
+    x.iter().zip(slopes).zip(bounds).map(|((&x, &slope), &(min, max))| match slope {
+        _ if slope > 0.0 && max - x <= near(x) => 0.0,
+        _ if slope < 0.0 && x - min <= near(x) => 0.0,
+        _ => slope,
+    })
+}
+
+/// Distance to a bound within which a number is at it.
+pub(super) fn near(x: f64) -> f64 {
+    AT_BOUND * (1.0 + x.abs())
 }

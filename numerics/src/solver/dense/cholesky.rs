@@ -12,7 +12,7 @@ use faer::{Accum, Mat, MatMut, MatRef, Par};
 
 use super::packed::Packed;
 use super::substitution::{solve_backward, solve_forward};
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::kernel::Kernel;
 use crate::machine::pages::SpareBuffer;
 use crate::machine::parallelism::parallelism;
@@ -54,7 +54,7 @@ impl Cholesky {
         kernel: &Kernel,
         regularization: &Regularization,
         observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    ) -> Result<Self> {
         Ok(Self { packed: Packed::gram(spare, cloud, kernel, regularization, observer)? })
     }
 
@@ -62,7 +62,7 @@ impl Cholesky {
     ///
     /// # Errors
     /// [`NumericsError::OutOfMemory`].
-    pub(super) fn blank(spare: &Arc<SpareBuffer>, n: usize) -> Result<Self, NumericsError> {
+    pub(super) fn blank(spare: &Arc<SpareBuffer>, n: usize) -> Result<Self> {
         Ok(Self { packed: Packed::blank(spare, n)? })
     }
 
@@ -93,11 +93,7 @@ impl Cholesky {
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
-    pub(super) fn factorize(
-        mut self,
-        floor: f64,
-        observer: &dyn Observer,
-    ) -> Result<Result<Self, usize>, NumericsError> {
+    pub(super) fn factorize(mut self, floor: f64, observer: &dyn Observer) -> Result<Result<Self, usize>> {
         match factorize_packed(&mut self.packed, floor, observer) {
             Ok(()) => Ok(Ok(self)),
             Err(Stop::NotPositive(point)) => {
@@ -194,7 +190,7 @@ pub(crate) fn factorize_in_place(
     a: MatMut<'_, f64>,
     floor: f64,
     observer: &dyn Observer,
-) -> Result<Result<(), usize>, NumericsError> {
+) -> Result<Result<(), usize>> {
     let mut leaf = Leaf::new(a.nrows());
     match recurse(a, 0, floor, &mut leaf, observer) {
         Ok(()) => Ok(Ok(())),

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::cholesky::Cholesky;
-use super::{Dense, Factorization};
-use crate::error::NumericsError;
+use super::{Factorization, Solver};
+use crate::error::Result;
 use crate::machine::pages::SpareBuffer;
 use crate::solver::system::System;
 
@@ -30,8 +30,8 @@ impl FactorBuilder {
     /// Allocates memory for the factor of n points.
     ///
     /// # Errors
-    /// [`NumericsError::OutOfMemory`].
-    pub fn new(spare: &Arc<SpareBuffer>, n_points: usize) -> Result<Self, NumericsError> {
+    /// `NumericsError::OutOfMemory`.
+    pub fn new(spare: &Arc<SpareBuffer>, n_points: usize) -> Result<Self> {
         Ok(Self { factor: Cholesky::blank(spare, n_points)?, n_filled: 0 })
     }
 
@@ -45,26 +45,26 @@ impl FactorBuilder {
         let rest = &mut self.factor.numbers_mut()[self.n_filled..];
         self.n_filled += rest.iter_mut().zip(numbers).map(|(to, from)| *to = from).count();
     }
+}
 
-    /// Restores the factorization of a system. `None` unless all numbers are there and their count fits the
-    /// system. The caller must ensure that the numbers are those of the system.
-    pub(in crate::solver) fn finish(
-        self,
+impl Solver {
+    /// Restores a solver from its [`Factor`]. Returns `None` unless that is complete and has the size of the
+    /// system.
+    pub fn restore(
+        factor: FactorBuilder,
         system: System,
         weights_of_one: Vec<f64>,
         norm1: f64,
         reciprocal_condition: f64,
-    ) -> Option<Dense> {
+    ) -> Option<Self> {
         let n = system.n_points();
-        let is_whole = self.n_missing() == 0 && self.factor.n_points() == n && weights_of_one.len() == n;
-        let factorization = Factorization::Cholesky(self.factor);
-        is_whole.then_some(Dense { system, factorization, norm1, reciprocal_condition, weights_of_one })
+        let is_whole = factor.n_missing() == 0 && factor.factor.n_points() == n && weights_of_one.len() == n;
+        let factorization = Factorization::Cholesky(factor.factor);
+        is_whole.then_some(Self { system, factorization, norm1, reciprocal_condition, weights_of_one })
     }
-}
 
-impl Dense {
-    /// Returns the factor. `None` for the fallback.
-    pub(in crate::solver) fn factor(&self) -> Option<Factor<'_>> {
+    /// Returns the factor for storage elsewhere, or `None` if the fallback took its place.
+    pub fn factor(&self) -> Option<Factor<'_>> {
         match &self.factorization {
             Factorization::Cholesky(factor) => Some(Factor {
                 numbers: factor.numbers(),

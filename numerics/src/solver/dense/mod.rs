@@ -13,10 +13,11 @@ use std::sync::Arc;
 use faer::prelude::ReborrowMut;
 use faer::{Mat, MatMut, Par};
 
+use super::MAX_INVERSE_DIAGONAL;
 use super::condition::estimate_norm1;
 use super::solution::MAX_RELATIVE_RESIDUAL;
 use super::system::System;
-use crate::error::{NotDefinite, NumericsError};
+use crate::error::{NotDefinite, NumericsError, Quantity, Result, SolverKind};
 use crate::machine::heap::{arc_payload, block_bytes, vec_bytes};
 use crate::machine::pages::SpareBuffer;
 use crate::observer::{Observer, Stage};
@@ -54,8 +55,10 @@ pub struct Workspace<'a> {
 /// coincide.
 pub(crate) const SMALLEST_PIVOT: f64 = 16.0 * f64::EPSILON;
 
-/// A factorization of `K(X, X) + αI`, kept with its system so that it cannot be used with another one.
-pub struct Dense {
+/// A system prepared for solving by a factorization of the whole matrix, `K(X, X) + αI`.
+///
+/// It keeps the system, so that it cannot be used with another one.
+pub struct Solver {
     system: System,
     factorization: Factorization,
     norm1: f64,
@@ -69,7 +72,7 @@ enum Factorization {
     PivotedCholesky { factor: PivotedCholesky, failed_at: usize, pivots: Arc<Cloud> },
 }
 
-impl Dense {
+impl Solver {
     /// Returns how many numbers Cholesky needs at its peak: half of the matrix. `None` if that overflows.
     pub(super) fn n_numbers_needed(n_points: usize) -> Option<usize> {
         Cholesky::n_numbers_needed(n_points)
@@ -88,11 +91,7 @@ impl Dense {
     ///
     /// # Errors
     /// [`NumericsError::OutOfMemory`], also if it needs more than it may take. [`NumericsError::Cancelled`].
-    pub(super) fn factorize(
-        workspace: Workspace<'_>,
-        system: System,
-        observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    pub fn dense_in(workspace: Workspace<'_>, system: System, observer: &dyn Observer) -> Result<Self> {
         let (cloud, kernel, regularization) = (system.cloud(), system.kernel(), system.regularization());
         observer.enter(Stage::Gram);
         let gram = Cholesky::assemble(workspace.spare, cloud, kernel, regularization, observer)?;
@@ -120,38 +119,38 @@ impl Dense {
         Ok(Self { system, factorization, norm1, reciprocal_condition, weights_of_one })
     }
 
-    pub(super) fn system(&self) -> &System {
+    pub fn system(&self) -> &System {
         &self.system
     }
 
-    pub(super) fn method(&self) -> Method {
+    /// Method by which the matrix was factorized.
+    pub fn method(&self) -> Method {
         match self.factorization {
             Factorization::Cholesky(_) => Method::Cholesky,
             Factorization::PivotedCholesky { .. } => Method::PivotedCholesky,
         }
     }
 
-    /// Returns the numerical rank: n for Cholesky, the number of pivots for the fallback.
-    pub(super) fn rank(&self) -> usize {
+    /// Numerical rank: n, or the number of pivots of the fallback.
+    pub fn rank(&self) -> usize {
         match &self.factorization {
             Factorization::Cholesky(_) => self.system.n_points(),
             Factorization::PivotedCholesky { factor, .. } => factor.pivots().len(),
         }
     }
 
-    /// Returns `1/(‖K + αI‖₁ ‖W‖₁)`, where W maps values to weights. It is estimated from the factor (Higham
-    /// 2002, alg. 15.1).
-    pub(super) fn reciprocal_condition(&self) -> f64 {
+    /// `1/(‖K + αI‖₁ ‖W‖₁)` where W maps values to weights, estimated (Higham 2002, alg. 15.1).
+    pub fn reciprocal_condition(&self) -> f64 {
         self.reciprocal_condition
     }
 
-    /// Returns `W·1`, `[n]`, with which the estimate of the condition begins.
+    /// `W·1`, `[n]`: the weights of the signature function.
     pub(super) fn weights_of_one(&self) -> &[f64] {
         &self.weights_of_one
     }
 
     /// `‖K + αI‖₁`.
-    pub(super) fn norm1(&self) -> f64 {
+    pub(crate) fn norm1(&self) -> f64 {
         self.norm1
     }
 
@@ -163,8 +162,8 @@ impl Dense {
         }
     }
 
-    /// Bytes held on the heap.
-    pub(super) fn n_bytes(&self) -> usize {
+    /// Bytes held on the heap, including those of the cloud.
+    pub fn n_bytes(&self) -> usize {
         let factor = match &self.factorization {
             Factorization::Cholesky(factor) => factor.n_bytes(),
             Factorization::PivotedCholesky { factor, pivots, .. } => {
@@ -174,26 +173,29 @@ impl Dense {
         factor + vec_bytes(&self.weights_of_one) + self.system.n_bytes()
     }
 
-    /// Overwrites the columns of `[n, k]` values with weights, `Λ = W Y`. W is `(K + αI)⁻¹`, or its
-    /// least-squares substitute for the fallback.
-    pub(super) fn solve_in_place(&self, values: MatMut<'_, f64>) {
+    /// Overwrites the columns of `[n, k]` values by weights at all points, `Λ = W Y`.
+    pub(crate) fn solve_in_place(&self, values: MatMut<'_, f64>) {
         self.factorization.solve_in_place(values);
     }
 
-    /// Overwrites the columns of `[n, k]` with `Wᵀ` times them.
-    pub(super) fn solve_transposed_in_place(&self, functionals: MatMut<'_, f64>) {
+    /// Overwrites the columns of `[n, k]` by `Wᵀ` times them.
+    ///
+    /// This turns functionals of the weights into functionals of the values, so that operators become
+    /// matrices.
+    pub(crate) fn solve_transposed_in_place(&self, functionals: MatMut<'_, f64>) {
         self.factorization.solve_transposed_in_place(functionals);
     }
 
-    /// Overwrites the columns of `[n, k]` with `L⁻¹` times them.
+    /// Overwrites the columns of `[n, k]` by `L⁻¹` times them, `LLᵀ = K + αI`.
     ///
     /// # Errors
-    /// [`NumericsError::NotPositiveDefinite`] if there is no Cholesky factor; [`NumericsError::Cancelled`].
-    pub(super) fn whiten_in_place(
+    /// [`NumericsError::NotPositiveDefinite`] where the matrix has no such factor in float64;
+    /// [`NumericsError::Cancelled`].
+    pub(crate) fn whiten_in_place(
         &self,
         mut columns: MatMut<'_, f64>,
         observer: &dyn Observer,
-    ) -> Result<(), NumericsError> {
+    ) -> Result<()> {
         let (n, cholesky) = (self.system.n_points(), self.cholesky()?);
         for (first, count) in pieces(columns.ncols(), (n * n) as f64) {
             observer.checkpoint()?;
@@ -202,12 +204,17 @@ impl Dense {
         Ok(())
     }
 
-    /// Computes the diagonal of `(K + αI)⁻¹`, `Σ_k (L⁻¹)_ki²`, in n³ flops and another n² numbers.
+    /// The diagonal of `(K + αI)⁻¹`, `[n]`.
     ///
     /// # Errors
-    /// [`NumericsError::NotPositiveDefinite`] if there is no Cholesky factor.
-    pub(super) fn inverse_diagonal(&self) -> Result<Vec<f64>, NumericsError> {
+    /// Returns [`NumericsError::Unsupported`] for more than [`MAX_INVERSE_DIAGONAL`] points, and the errors
+    /// of [`Solver::whiten_in_place`].
+    pub(crate) fn inverse_diagonal(&self) -> Result<Vec<f64>> {
         let n = self.system.n_points();
+        if n > MAX_INVERSE_DIAGONAL {
+            let solver = SolverKind::Dense;
+            return Err(NumericsError::Unsupported { solver, quantity: Quantity::InverseDiagonal });
+        }
         let mut inverse = Mat::<f64>::identity(n, n);
         // On one thread: the caller is one of many tasks, and a thread that waits would begin another task of
         // that kind.
@@ -218,15 +225,15 @@ impl Dense {
     /// `ln det(K + αI)`.
     ///
     /// # Errors
-    /// [`NumericsError::NotPositiveDefinite`] if there is no Cholesky factor.
-    pub(super) fn log_determinant(&self) -> Result<f64, NumericsError> {
+    /// Returns the errors of [`Solver::whiten_in_place`].
+    pub(crate) fn log_determinant(&self) -> Result<f64> {
         Ok(self.cholesky()?.log_determinant())
     }
 
     /// Returns the Cholesky factor, unless the matrix is singular to rounding. A factor of such a matrix
     /// exists by luck. It still solves smooth right-hand sides, but its variances and determinants are off by
     /// tens of percent.
-    fn cholesky(&self) -> Result<&Cholesky, NumericsError> {
+    fn cholesky(&self) -> Result<&Cholesky> {
         match &self.factorization {
             Factorization::Cholesky(_) if self.reciprocal_condition < f64::EPSILON => {
                 let reciprocal_condition = self.reciprocal_condition;
@@ -239,10 +246,8 @@ impl Dense {
         }
     }
 
-    /// Returns the refusal with its remedy, an α for which Cholesky is sure to succeed in float64:
-    /// `4 n ε ‖K‖₁`. If the residual was too large, α is also large enough that `ε ‖K‖₁ ‖Λ‖ ≤ ε ‖K‖₁ ‖Y‖/α`
-    /// is small for any values.
-    pub(super) fn not_positive_definite(&self, reason: NotDefinite) -> NumericsError {
+    /// Returns the refusal with its remedy: an α that is large enough.
+    pub(crate) fn not_positive_definite(&self, reason: NotDefinite) -> NumericsError {
         let multiple = match reason {
             NotDefinite::Residual { .. } => (self.system.n_points() as f64).max(1.0 / MAX_RELATIVE_RESIDUAL),
             NotDefinite::BackwardError { .. }

@@ -18,7 +18,7 @@ use std::sync::Arc;
 use faer::{MatMut, MatRef};
 use rayon::prelude::*;
 
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::kernel::Kernel;
 use crate::machine::pages::{Buffer, SpareBuffer};
 use crate::observer::Observer;
@@ -92,14 +92,14 @@ impl Packed {
     /// Assembles `K + αI` of a cloud.
     ///
     /// # Errors
-    /// [`NumericsError::OutOfMemory`], [`NumericsError::Cancelled`].
+    /// `NumericsError::OutOfMemory`, `NumericsError::Cancelled`.
     pub(super) fn gram(
         spare: &Arc<SpareBuffer>,
         cloud: &Cloud,
         kernel: &Kernel,
         regularization: &Regularization,
         observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    ) -> Result<Self> {
         let n = cloud.n_points();
         let mut this = Self::blank(spare, n)?;
         let (nodes, stride) = (Nodes::of(cloud), this.stride());
@@ -133,8 +133,8 @@ impl Packed {
     /// Allocates memory for n points, with arbitrary contents.
     ///
     /// # Errors
-    /// [`NumericsError::OutOfMemory`].
-    pub(super) fn blank(spare: &Arc<SpareBuffer>, n: usize) -> Result<Self, NumericsError> {
+    /// `NumericsError::OutOfMemory`.
+    pub(super) fn blank(spare: &Arc<SpareBuffer>, n: usize) -> Result<Self> {
         let n_numbers = Self::n_numbers(n).unwrap_or(usize::MAX);
         Ok(Self { buffer: spare.take(n_numbers)?, n })
     }

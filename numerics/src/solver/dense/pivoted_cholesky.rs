@@ -13,7 +13,7 @@ use faer::{Accum, Mat, MatMut, MatRef};
 
 use super::cholesky::factorize_in_place;
 use super::pivoting::{Pivoting, Pivots};
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::kernel::Kernel;
 use crate::machine::heap::vec_bytes;
 use crate::machine::parallelism::parallelism;
@@ -57,7 +57,7 @@ impl PivotedCholesky {
         regularization: &Regularization,
         may_take_all: impl FnOnce() -> bool,
         observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    ) -> Result<Self> {
         let n = cloud.n_points();
         let attempt = |max_rank: usize| {
             let mut buffer = vec![0.0; n_numbers(n, max_rank)];
@@ -84,7 +84,7 @@ impl PivotedCholesky {
     }
 
     /// Turns L₂₁ into M and factorizes `I + MᵀM` or `I + MMᵀ`.
-    fn prepare_least_squares(&mut self, observer: &dyn Observer) -> Result<(), NumericsError> {
+    fn prepare_least_squares(&mut self, observer: &dyn Observer) -> Result<()> {
         let (n, rank) = (self.order.len(), self.rank);
         let (columns, rest) = self.buffer.split_at_mut(n * rank);
         let (l11, mut m) = MatMut::from_column_major_slice_mut(columns, n, rank).split_at_row_mut(rank);

@@ -5,7 +5,7 @@ use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{Accum, MatMut, MatRef};
 use rayon::prelude::*;
 
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::kernel::Kernel;
 use crate::machine::parallelism::parallelism;
 use crate::observer::Observer;
@@ -78,8 +78,8 @@ impl<'a> Pivoting<'a> {
     /// would be needed.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(super) fn run(mut self, max_rank: usize, observer: &dyn Observer) -> Result<Pivots, NumericsError> {
+    /// `NumericsError::Cancelled`.
+    pub(super) fn run(mut self, max_rank: usize, observer: &dyn Observer) -> Result<Pivots> {
         let is_complete = loop {
             observer.checkpoint()?;
             let largest = self.remaining[self.rank..].iter().copied().fold(0.0, f64::max);
@@ -142,7 +142,7 @@ impl<'a> Pivoting<'a> {
     }
 
     /// Returns `K + D − LLᵀ` at the first rows that are not pivots.
-    fn schur_complement(&self, n_rows: usize, observer: &dyn Observer) -> Result<Block, NumericsError> {
+    fn schur_complement(&self, n_rows: usize, observer: &dyn Observer) -> Result<Block> {
         let (n, first) = (self.order.len(), self.rank);
         let candidates = self.points(first, n_rows)?;
         let mut entries = vec![0.0; n_rows * n_rows];
@@ -159,12 +159,7 @@ impl<'a> Pivoting<'a> {
 
     /// Appends the columns of the accepted pivots, which are the first rows of a factorized block:
     /// `L₂ = (K₂ − L₂′L₁′ᵀ) L₁⁻ᵀ`. A prime marks entries of earlier columns.
-    fn append(
-        &mut self,
-        block: &Block,
-        n_accepted: usize,
-        observer: &dyn Observer,
-    ) -> Result<(), NumericsError> {
+    fn append(&mut self, block: &Block, n_accepted: usize, observer: &dyn Observer) -> Result<()> {
         self.write_kernel_columns(block, n_accepted, observer)?;
         let (n, first, below) = (self.order.len(), self.rank, self.rank + n_accepted);
         let (before, rest) = self.columns.split_at_mut(n * first);
@@ -192,7 +187,7 @@ impl<'a> Pivoting<'a> {
         block: &Block,
         n_accepted: usize,
         observer: &dyn Observer,
-    ) -> Result<(), NumericsError> {
+    ) -> Result<()> {
         let (n, first, below) = (self.order.len(), self.rank, self.rank + n_accepted);
         let pivots = self.points(first, n_accepted)?;
         let new = &mut self.columns[n * first..n * below];
@@ -209,7 +204,7 @@ impl<'a> Pivoting<'a> {
     }
 
     /// Returns the points of some rows.
-    fn points(&self, first: usize, n_rows: usize) -> Result<Cloud, NumericsError> {
+    fn points(&self, first: usize, n_rows: usize) -> Result<Cloud> {
         let rows = self.order[first..][..n_rows].iter();
         let coordinates = rows.flat_map(|&point| self.cloud.point(point)).copied().collect();
         Cloud::new(coordinates, self.cloud.dimension())

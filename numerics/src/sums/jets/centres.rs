@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::Layout;
 use super::pass::{Expansion, Sums};
 use super::tiles::mirror;
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::machine::registers::{BLOCK, Block};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
@@ -28,7 +28,7 @@ pub(super) fn jets(
     cloud: &Cloud,
     layout: Layout,
     observer: &dyn Observer,
-) -> Result<Vec<f64>, NumericsError> {
+) -> Result<Vec<f64>> {
     let (n_sums, width) = (layout.n_sums(), layout.width());
     let pair = |a: Share<'_>, b: Option<Share<'_>>| {
         expansion.nodes.dispatch(BlockPair { expansion, cloud, a, b });

@@ -9,7 +9,7 @@ mod tiles;
 use rayon::prelude::*;
 
 use super::nodes::{Nodes, blocked};
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::kernel::Kernel;
 use crate::machine::heap::vec_bytes;
 use crate::machine::small::{Small, zeros};
@@ -137,7 +137,7 @@ impl Jets {
         queries: &Cloud,
         order: JetOrder,
         observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    ) -> Result<Self> {
         Self::over(&Nodes::of(cloud), kernel, weights, queries, order, observer)
     }
 
@@ -152,7 +152,7 @@ impl Jets {
         queries: &Cloud,
         order: JetOrder,
         observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    ) -> Result<Self> {
         debug_assert_eq!(nodes.dimension(), queries.dimension());
         let layout = Layout { order, dimension: nodes.dimension() };
         let (weights, width) = (blocked(weights), layout.width());
@@ -182,7 +182,7 @@ impl Jets {
         kernel: &Kernel,
         weights: &[f64],
         observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    ) -> Result<Self> {
         if cloud.dimension() > centres::MAX_DIMENSION || cloud.n_points() < centres::MIN_POINTS {
             return Self::evaluate(cloud, kernel, weights, cloud, JetOrder::Hessian, observer);
         }
@@ -195,7 +195,7 @@ impl Jets {
         kernel: &Kernel,
         weights: &[f64],
         observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    ) -> Result<Self> {
         let layout = Layout { order: JetOrder::Hessian, dimension: cloud.dimension() };
         let expansion = Expansion { nodes, kernel, weights: &blocked(weights) };
         let packed = centres::jets(expansion, cloud, layout, observer)?;
@@ -293,7 +293,7 @@ impl Jets {
 ///
 /// # Errors
 /// [`NumericsError::KernelNotSmooth`] with the first query that is a point of the cloud.
-pub(crate) fn check_smooth_at(cloud: &Cloud, kernel: &Kernel, queries: &Cloud) -> Result<(), NumericsError> {
+pub(crate) fn check_smooth_at(cloud: &Cloud, kernel: &Kernel, queries: &Cloud) -> Result<()> {
     if !kernel.has_kink() {
         return Ok(());
     }

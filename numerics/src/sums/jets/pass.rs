@@ -7,7 +7,7 @@ use super::{JetOrder, Layout};
 use crate::kernel::{Kernel, Pairs};
 use crate::machine::registers::{Block, Pack};
 use crate::points::cloud::Cloud;
-use crate::sums::nodes::Nodes;
+use crate::sums::nodes::{Nodes, PackPlace};
 
 /// The function `Σ_j λ_j k(·, x_j)`, with points and weights laid out in blocks.
 #[derive(Clone, Copy)]
@@ -158,11 +158,17 @@ impl<S: Simd, const ORDER: usize> Pairs<S> for Weighted<'_, S, ORDER> {
     fn pack(&mut self, at: usize) -> (Pack<S>, ()) {
         let Expansion { nodes, kernel, .. } = self.expansion;
         let differences = &mut self.sums.block.differences;
-        let q = nodes.scaled_distances(self.simd, (self.block, at), self.x, kernel, |c, difference| {
-            if ORDER >= 1 {
-                difference.store(&mut differences[c], at);
-            }
-        });
+        let q = nodes.scaled_distances(
+            self.simd,
+            PackPlace { block: self.block, at },
+            self.x,
+            kernel,
+            |c, difference| {
+                if ORDER >= 1 {
+                    difference.store(&mut differences[c], at);
+                }
+            },
+        );
         (q, ())
     }
 

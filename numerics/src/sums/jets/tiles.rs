@@ -49,9 +49,9 @@ impl ProfileBlock {
             }
             for b in (a + TILE..self.differences.len()).step_by(TILE) {
                 match self.differences.len() - b {
-                    1 => self.add_tile::<S, 1>(simd, weights, (a, b), &mut hessian),
-                    2 => self.add_tile::<S, 2>(simd, weights, (a, b), &mut hessian),
-                    _ => self.add_tile::<S, TILE>(simd, weights, (a, b), &mut hessian),
+                    1 => self.add_tile::<S, 1>(simd, weights, a, b, &mut hessian),
+                    2 => self.add_tile::<S, 2>(simd, weights, a, b, &mut hessian),
+                    _ => self.add_tile::<S, TILE>(simd, weights, a, b, &mut hessian),
                 }
             }
         }
@@ -110,7 +110,8 @@ impl ProfileBlock {
         &self,
         simd: S,
         weights: &Block,
-        (a, b): (usize, usize),
+        a: usize,
+        b: usize,
         hessian: &mut Triangle<Sum<S>>,
     ) {
         let mut products = [[Sum::splat(simd, 0.0); N]; TILE];

@@ -11,9 +11,9 @@
 
 use super::super::geometry::Geometry;
 use super::{Operator, regular};
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::function::COLUMNS_AT_ONCE;
-use crate::function::functionals::{JetFunctional, deviations, has_variance};
+use crate::function::functionals::{JetFunctional, ScaledFit, deviations, has_variance};
 use crate::function::interpolant::Interpolant;
 use crate::machine::vector::{dot, norm};
 use crate::observer::Observer;
@@ -36,7 +36,7 @@ impl Operator {
         factor: f64,
         queries: &Cloud,
         observer: &dyn Observer,
-    ) -> Result<Vec<f64>, NumericsError> {
+    ) -> Result<Vec<f64>> {
         let mut total = Applied { geometry, interpolant, factor, queries }.of_function(self, observer)?;
         if geometry.deviations().is_some() {
             self.add_surface(geometry, &interpolant.at(queries, self.order(), observer)?, &mut total);
@@ -100,8 +100,9 @@ pub(super) struct Applied<'a> {
 
 impl Applied<'_> {
     /// Computes the deviations that come from the function alone: `[m]` or `[m, d]`.
-    fn of_function(&self, operator: Operator, observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
-        let (solver, solution) = (&*self.interpolant.solver, &*self.interpolant.solution);
+    fn of_function(&self, operator: Operator, observer: &dyn Observer) -> Result<Vec<f64>> {
+        let Interpolant { solver, solution } = self.interpolant;
+        let fit = ScaledFit { solver, solution, factor: self.factor };
         let order = operator.order().degree();
         if !has_variance(solver.kernel(), order) {
             return Err(NumericsError::DerivativesVary { order });
@@ -112,7 +113,7 @@ impl Applied<'_> {
         for some in all.chunks((COLUMNS_AT_ONCE / width).max(1)) {
             let functionals: Vec<JetFunctional> =
                 some.iter().flat_map(|&query| functionals(self.geometry, operator, query)).collect();
-            let found = deviations((solver, solution, self.factor), self.queries, &functionals, observer)?;
+            let found = deviations(fit, self.queries, &functionals, observer)?;
             for (query, found) in some.iter().zip(found.found.chunks_exact(width)) {
                 total[query * width..][..width].copy_from_slice(found);
             }

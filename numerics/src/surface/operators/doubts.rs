@@ -10,9 +10,9 @@ use rayon::prelude::*;
 use super::super::geometry::Geometry;
 use super::deviations::functionals;
 use super::{Operator, regular};
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::function::errors::{Process, errors_under};
-use crate::function::functionals::{JetFunctional, deviations, has_variance};
+use crate::function::functionals::{JetFunctional, ScaledFit, deviations, has_variance};
 use crate::function::interpolant::Interpolant;
 use crate::kernel::Kernel;
 use crate::machine::vector::norm;
@@ -62,7 +62,7 @@ impl Judged<'_> {
     ///
     /// # Errors
     /// [`NumericsError::InvalidKernelParameter`] for a process beyond float64.
-    pub fn by_deviations(self, deviations: &[f64]) -> Result<Vec<usize>, NumericsError> {
+    pub fn by_deviations(self, deviations: &[f64]) -> Result<Vec<usize>> {
         let (kernel, factor) = self.process()?;
         let findings = Findings { geometry: self.geometry, found: self.found, kernel: &kernel, factor };
         let k = findings.n_components();
@@ -80,7 +80,7 @@ impl Judged<'_> {
     /// # Errors
     /// [`NumericsError::DimensionMismatch`], [`NumericsError::MeanNotDetermined`],
     /// [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
-    pub fn judge(self, operator: Operator, observer: &dyn Observer) -> Result<Vec<usize>, NumericsError> {
+    pub fn judge(self, operator: Operator, observer: &dyn Observer) -> Result<Vec<usize>> {
         let regular: Vec<usize> = regular(self.geometry).collect();
         let has_derivatives = has_variance(self.interpolant.solver.kernel(), operator.order().degree());
         if regular.is_empty() || !has_derivatives {
@@ -119,7 +119,7 @@ impl Judged<'_> {
     /// Returns the kernel of the process that the values come from, and its scale factor.
     ///
     /// Beside a kernel that stretches coordinates, the process is learned in the stretched coordinates.
-    fn process(&self) -> Result<(Kernel, f64), NumericsError> {
+    fn process(&self) -> Result<(Kernel, f64)> {
         let own = self.interpolant.solver.kernel();
         let Some(learned) = self.learned else { return Ok((own.clone(), self.factor)) };
         let kernel = match own.length_scales() {
@@ -132,11 +132,7 @@ impl Judged<'_> {
         Ok((kernel, learned.variance))
     }
 
-    fn errors(
-        &self,
-        functionals: &[JetFunctional],
-        observer: &dyn Observer,
-    ) -> Result<Vec<f64>, NumericsError> {
+    fn errors(&self, functionals: &[JetFunctional], observer: &dyn Observer) -> Result<Vec<f64>> {
         let (interpolant, queries) = (self.interpolant, self.queries);
         let (solver, solution) = (&*interpolant.solver, &*interpolant.solution);
         let (kernel, factor) = (&self.process()?.0, self.process()?.1);
@@ -144,7 +140,7 @@ impl Judged<'_> {
             let process = Process { kernel, noise: *ratio, factor, trend: trend.as_ref() };
             return errors_under(&process, interpolant, queries, functionals, observer);
         }
-        match deviations((solver, solution, factor), queries, functionals, observer) {
+        match deviations(ScaledFit { solver, solution, factor }, queries, functionals, observer) {
             // The pivoted fallback has no variances, but it has weights.
             Err(NumericsError::NotPositiveDefinite { .. }) => {
                 let noise = match solver.regularization() {

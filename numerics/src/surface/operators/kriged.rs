@@ -8,7 +8,7 @@ use super::super::geometry::Geometry;
 use super::deviations::functionals;
 use super::doubts::Findings;
 use super::{Operator, regular};
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::function::functionals::JetFunctional;
 use crate::function::local_kriging::{FunctionalsRequest, KrigedFunctionals, LocalKriging};
 use crate::observer::Observer;
@@ -42,7 +42,7 @@ impl Operator {
     /// Applies the operator to a kriged function at the queries of a geometry, `[m, d]` or `[m]`.
     ///
     /// # Errors
-    /// [`NumericsError::DerivativesVary`] where the process has no such derivatives, and the errors of
+    /// `NumericsError::DerivativesVary` where the process has no such derivatives, and the errors of
     /// [`LocalKriging::at`].
     pub fn on_kriged(
         self,
@@ -50,7 +50,7 @@ impl Operator {
         function: Kriged<'_>,
         queries: &Cloud,
         observer: &dyn Observer,
-    ) -> Result<OfKriged, NumericsError> {
+    ) -> Result<OfKriged> {
         function.with(self, geometry, queries, observer)
     }
 }
@@ -62,7 +62,7 @@ impl Kriged<'_> {
         geometry: &Geometry,
         queries: &Cloud,
         observer: &dyn Observer,
-    ) -> Result<OfKriged, NumericsError> {
+    ) -> Result<OfKriged> {
         let order = operator.order();
         let (d, count) = (queries.dimension(), operator.n_components(queries.dimension()));
         let of_query = |query: usize| {

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 
 use super::curvature::tangential_trace;
 use super::geometry::Geometry;
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::function::interpolant::Interpolant;
 use crate::kernel::{Kernel, Pairs};
 use crate::machine::registers::{BLOCK, Block, Pack};
@@ -29,7 +29,7 @@ use crate::points::cloud::Cloud;
 use crate::solver::Solver;
 use crate::solver::trend::{Basis, Mean};
 use crate::sums::jets::{JetOrder, Jets, check_smooth_at};
-use crate::sums::nodes::Nodes;
+use crate::sums::nodes::{Nodes, PackPlace};
 pub(crate) use doubts::JUDGED_FUNCTIONALS;
 pub use doubts::Judged;
 pub use kriged::{Kriged, OfKriged};
@@ -74,7 +74,7 @@ impl Operator {
         interpolant: &Interpolant,
         queries: &Cloud,
         observer: &dyn Observer,
-    ) -> Result<Vec<f64>, NumericsError> {
+    ) -> Result<Vec<f64>> {
         Ok(self.of_jets(geometry, &interpolant.at(queries, self.order(), observer)?))
     }
 
@@ -99,7 +99,7 @@ impl Operator {
         queries: &Cloud,
         mean: Mean,
         observer: &dyn Observer,
-    ) -> Result<Vec<f64>, NumericsError> {
+    ) -> Result<Vec<f64>> {
         with_mean(operator_matrix(geometry, solver, queries, self, observer)?, geometry, solver, mean, self)
     }
 }
@@ -142,7 +142,7 @@ fn operator_matrix(
     queries: &Cloud,
     operator: Operator,
     observer: &dyn Observer,
-) -> Result<Vec<f64>, NumericsError> {
+) -> Result<Vec<f64>> {
     let (cloud, kernel) = (solver.cloud(), solver.kernel());
     cloud.check_same_dimension(queries)?;
     check_smooth_at(cloud, kernel, queries)?;
@@ -196,7 +196,7 @@ fn with_mean(
     solver: &Solver,
     mean: Mean,
     operator: Operator,
-) -> Result<Vec<f64>, NumericsError> {
+) -> Result<Vec<f64>> {
     if mean == Mean::Zero {
         return Ok(matrix);
     }
@@ -296,11 +296,17 @@ impl<S: Simd> RowPairs<'_, S> {
         let Row { nodes, kernel, geometry, query, x, .. } = *self.row;
         let normal = geometry.normal(query);
         let mut along = Pack::splat(self.simd, 0.0);
-        let q = nodes.scaled_distances(self.simd, (self.block, at), x, kernel, |c, stretched| {
-            let difference = stretched * kernel.stretch(c);
-            along = difference.mul_add(Pack::splat(self.simd, normal[c]), along);
-            each(c, difference);
-        });
+        let q = nodes.scaled_distances(
+            self.simd,
+            PackPlace { block: self.block, at },
+            x,
+            kernel,
+            |c, stretched| {
+                let difference = stretched * kernel.stretch(c);
+                along = difference.mul_add(Pack::splat(self.simd, normal[c]), along);
+                each(c, difference);
+            },
+        );
         (q, along)
     }
 }

@@ -98,7 +98,7 @@ impl Unconfirmed<'_> {
     ///
     /// A flat cloud counts as curved by half of one over its radius.
     fn is_noisy(&self, surface: &SignatureSurface) -> bool {
-        let scale = self.largest().max(0.5 / surface.radius());
+        let scale = self.largest().max(0.5 / surface.radius);
         self.quadric.is_some_and(|quadric| quadric.uncertainty > NOISY * scale)
     }
 
@@ -126,7 +126,7 @@ impl Unconfirmed<'_> {
 
     /// Returns the largest difference from other curvatures, over the largest curvature.
     fn difference(&self, surface: &SignatureSurface, other: &[f64]) -> f64 {
-        let floor = FLAT / surface.radius();
+        let floor = FLAT / surface.radius;
         let largest = other.iter().fold(self.largest().max(floor), |a, k| a.max(k.abs()));
         self.curvatures.iter().zip(other).fold(0.0, |a: f64, (k, o)| a.max((k - o).abs())) / largest
     }
@@ -136,7 +136,7 @@ impl Unconfirmed<'_> {
     /// The left side is what u misses at a point that is left out (Rippa 1999).
     fn is_predicted(&self, surface: &SignatureSurface, share: f64) -> bool {
         let Some(misses) = surface.left_out_misses() else { return false };
-        let nearest = surface.sampling().neighbours().nearest_positions(self.x, SPACING_NEIGHBOURS);
+        let nearest = surface.sampling.neighbours().nearest_positions(self.x, SPACING_NEIGHBOURS);
         // The prediction says nothing away from the points, and at a rim, where no point shows the other
         // side.
         let is_at_point =

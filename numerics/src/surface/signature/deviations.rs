@@ -1,7 +1,7 @@
 //! Standard deviations of the geometry of a signature function, from local regressions.
 
 use super::SignatureSurface;
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::machine::small::Small;
 use crate::machine::vector::{dot, norm};
 use crate::observer::Observer;
@@ -21,7 +21,7 @@ pub(super) fn deviations(
     queries: &Cloud,
     served: &Served,
     observer: &dyn Observer,
-) -> Result<Deviations, NumericsError> {
+) -> Result<Deviations> {
     let (m, d) = (queries.n_points(), queries.dimension());
     let k = d - 1;
     let are_points = queries == surface.cloud();

@@ -1,7 +1,7 @@
 //! Normals at the points before their signs are made consistent.
 
 use super::function::Signature;
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::machine::vector::norm;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
@@ -24,7 +24,7 @@ pub(crate) fn directions(
     sampling: &Sampling,
     quadrics: &LocalQuadrics,
     observer: &dyn Observer,
-) -> Result<Directions, NumericsError> {
+) -> Result<Directions> {
     let n = signature.function().solver.n_points();
     let (normals, has_sign) = match signature.jets() {
         Some(jets) => along_gradients(signature, jets, sampling, quadrics),
@@ -67,11 +67,11 @@ fn along_quadrics(
     sampling: &Sampling,
     quadrics: &LocalQuadrics,
     observer: &dyn Observer,
-) -> Result<(Vec<f64>, Vec<bool>), NumericsError> {
+) -> Result<(Vec<f64>, Vec<bool>)> {
     let function = signature.function();
     let cloud = function.solver.cloud();
     let (n, d) = (cloud.n_points(), cloud.dimension());
-    let at = |side: f64| -> Result<Jets, NumericsError> {
+    let at = |side: f64| -> Result<Jets> {
         let mut moved = cloud.coordinates().to_vec();
         for (point, x) in moved.chunks_exact_mut(d).enumerate() {
             let step = side * DIFFERENCE_STEP * sampling.spacing(point);

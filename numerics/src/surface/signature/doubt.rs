@@ -5,7 +5,7 @@
 //! off it may be itself.
 
 use super::SignatureSurface;
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::machine::vector::{dot, norm};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
@@ -43,7 +43,7 @@ pub(super) fn uncertain<'a>(
     served: &Served,
     quadric: impl Fn(usize) -> Option<LocalQuadric<'a>>,
     observer: &dyn Observer,
-) -> Result<Vec<usize>, NumericsError> {
+) -> Result<Vec<usize>> {
     let d = queries.dimension();
     // In a smaller cloud each point may see all others.
     if doubtful.is_empty() || surface.cloud().n_points() < 4 * n_quadric_neighbours(d) {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::function::interpolant::Interpolant;
 use crate::machine::heap::vec_bytes;
 use crate::observer::Observer;
@@ -33,7 +33,7 @@ impl Signature {
     ///
     /// # Errors
     /// Returns the errors of `Solution::with_jets`.
-    pub fn fit(solver: Arc<Solver>, observer: &dyn Observer) -> Result<Self, NumericsError> {
+    pub fn fit(solver: Arc<Solver>, observer: &dyn Observer) -> Result<Self> {
         let ones = vec![1.0; solver.n_points()];
         let (solution, jets) = if solver.kernel().has_kink() {
             (Solution::of(&solver, &ones, observer)?, None)
@@ -47,7 +47,7 @@ impl Signature {
     ///
     /// # Errors
     /// Returns the errors of [`Interpolant::at`].
-    pub fn of(function: Interpolant, observer: &dyn Observer) -> Result<Self, NumericsError> {
+    pub fn of(function: Interpolant, observer: &dyn Observer) -> Result<Self> {
         let solver = &function.solver;
         let jets = if solver.kernel().has_kink() {
             None
@@ -57,11 +57,7 @@ impl Signature {
         Self::with(function, jets, observer)
     }
 
-    fn with(
-        function: Interpolant,
-        jets: Option<Jets>,
-        observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    fn with(function: Interpolant, jets: Option<Jets>, observer: &dyn Observer) -> Result<Self> {
         let at_points = match jets {
             None => None,
             Some(jets) => {

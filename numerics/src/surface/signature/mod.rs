@@ -13,7 +13,7 @@ use std::sync::{Arc, OnceLock};
 use super::NearNormals;
 use super::degeneracy::is_too_rough;
 use super::orientation::{Oriented, Sampled, SurfaceOrientation};
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::function::interpolant::Interpolant;
 use crate::machine::heap::{arc_payload, block_bytes, vec_bytes};
 use crate::machine::vector::dot;
@@ -21,14 +21,13 @@ use crate::observer::Observer;
 use crate::patches::Patches;
 use crate::points::cloud::Cloud;
 use crate::points::duplicates::count_duplicates;
-use crate::points::local_quadrics::{LocalQuadric, LocalQuadrics};
+use crate::points::local_quadrics::LocalQuadrics;
 use crate::points::neighbourhoods::Neighbourhoods;
 use crate::points::neighbours::Neighbour;
 use crate::points::patch::Patch;
 use crate::points::quadric::n_quadric_neighbours;
 use crate::points::sampling::{SPACING_NEIGHBOURS, Sampling};
 use crate::solver::MAX_INVERSE_DIAGONAL;
-use crate::sums::jets::Jets;
 use directions::directions;
 pub use function::Signature;
 pub(crate) use serving::serve;
@@ -39,7 +38,7 @@ pub(crate) use serving::serve;
 /// once per factorization.
 pub struct SignatureSurface {
     signature: Signature,
-    sampling: Arc<Sampling>,
+    pub(super) sampling: Arc<Sampling>,
     quadrics: LocalQuadrics,
     oriented: Oriented,
     is_too_rough: bool,
@@ -55,11 +54,7 @@ impl SignatureSurface {
     /// # Errors
     /// [`NumericsError::DimensionTooSmall`] for d = 1, [`NumericsError::Overflow`],
     /// [`NumericsError::Cancelled`].
-    pub fn of(
-        signature: Interpolant,
-        given: Option<&Cloud>,
-        observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    pub fn of(signature: Interpolant, given: Option<&Cloud>, observer: &dyn Observer) -> Result<Self> {
         let sampling = Arc::new(Sampling::of(signature.solver.cloud(), observer)?);
         Self::over(sampling, Signature::of(signature, observer)?, given, observer)
     }
@@ -73,7 +68,7 @@ impl SignatureSurface {
         signature: Signature,
         given: Option<&Cloud>,
         observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
+    ) -> Result<Self> {
         let solver = signature.function().solver.clone();
         let cloud = solver.cloud();
         if cloud.dimension() < 2 {
@@ -113,15 +108,6 @@ impl SignatureSurface {
         self.oriented.how
     }
 
-    pub(crate) fn sampling(&self) -> &Arc<Sampling> {
-        &self.sampling
-    }
-
-    /// Returns whether ∇u at a point is rounding, and false where there is no ∇u.
-    pub(crate) fn is_rounding(&self, point: usize) -> bool {
-        self.signature.is_rounding(point)
-    }
-
     /// Returns whether the points around x lie on a line, or span for another reason fewer directions than a
     /// surface has.
     pub(crate) fn is_thread(&self, x: &[f64]) -> bool {
@@ -129,16 +115,6 @@ impl SignatureSurface {
         let nearest = self.sampling.neighbours().nearest_positions(x, count);
         let patch = Patch::of(self.cloud(), x, nearest.iter().map(|found| found.point));
         patch.is_some_and(|patch| patch.n_points() == count && patch.is_thread())
-    }
-
-    /// Returns whether second derivatives at the points see the cusp of the kernel.
-    pub(crate) fn is_too_rough(&self) -> bool {
-        self.is_too_rough
-    }
-
-    /// Half the diagonal of the bounding box, unit L, and 1 for a single position.
-    pub(crate) fn radius(&self) -> f64 {
-        self.radius
     }
 
     /// Returns `|λ_i/((K+αI)⁻¹)_ii|`, what u misses at each point when that is left out (Rippa 1999).
@@ -159,7 +135,7 @@ impl SignatureSurface {
     ///
     /// # Errors
     /// Returns the errors of [`Patches::of`].
-    fn patches(&self, observer: &dyn Observer) -> Result<Arc<Patches>, NumericsError> {
+    fn patches(&self, observer: &dyn Observer) -> Result<Arc<Patches>> {
         if let Some(patches) = self.patches.get() {
             return Ok(patches.clone());
         }
@@ -186,21 +162,6 @@ impl SignatureSurface {
         &self.oriented.normals[point * d..][..d]
     }
 
-    /// Returns whether the evidence for the side of a point is contradictory.
-    pub(crate) fn has_ambiguous_side(&self, point: usize) -> bool {
-        self.oriented.is_ambiguous[point]
-    }
-
-    /// Jets u, ∇u and D²u at the points, where they were kept.
-    pub(crate) fn jets_at_points(&self) -> Option<&Jets> {
-        self.signature.jets()
-    }
-
-    /// The quadric through the neighbours of a point.
-    pub(crate) fn quadric(&self, point: usize) -> Option<LocalQuadric<'_>> {
-        self.quadrics.at(point)
-    }
-
     /// Returns the sign that turns ∇u at x into an outward direction. `found` is a buffer.
     ///
     /// The points near x decide: a narrow kernel makes u a ridge, and −∇u points inward just inside. On
@@ -217,7 +178,7 @@ impl SignatureSurface {
     ///
     /// It is −1, inward, also where there is no ∇u.
     pub(crate) fn gradient_side(&self, x: &[f64], outward: &[f64], found: &mut Vec<Neighbour>) -> f64 {
-        let Some(jets) = self.jets_at_points() else { return -1.0 };
+        let Some(jets) = self.signature.jets() else { return -1.0 };
         self.sampling.neighbours().nearest_positions_into(x, SPACING_NEIGHBOURS, found);
         let along: f64 = found.iter().map(|found| dot(jets.gradient(found.point), outward)).sum();
         if along > 0.0 { 1.0 } else { -1.0 }

@@ -9,7 +9,7 @@ use super::confirmation::Unconfirmed;
 use super::deviations::deviations;
 use super::doubt::{is_doubtful, uncertain};
 use super::offset::{OffsetJet, offset_jet_at};
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::machine::small::Small;
 use crate::machine::vector::norm;
 use crate::observer::{Observer, Stage};
@@ -37,18 +37,20 @@ pub(crate) fn serve(
     queries: &Cloud,
     request: &GeometryRequest,
     observer: &dyn Observer,
-) -> Result<Served, NumericsError> {
+) -> Result<Served> {
     let order = match request.model {
         SurfaceModel::Offset => JetOrder::Value,
         SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Local => JetOrder::Hessian,
     };
     let are_points = queries == surface.cloud();
-    let jets = match surface.jets_at_points() {
+    let jets = match surface.signature.jets() {
         Some(jets) if are_points => Cow::Borrowed(jets),
         Some(_) | None => Cow::Owned(surface.signature().at(queries, order, observer)?),
     };
     let is_rounding = match &jets {
-        Cow::Borrowed(_) => (0..queries.n_points()).map(|point| surface.is_rounding(point)).collect(),
+        Cow::Borrowed(_) => {
+            (0..queries.n_points()).map(|point| surface.signature.is_rounding(point)).collect()
+        }
         Cow::Owned(jets) if order == JetOrder::Hessian => {
             roundings(surface.signature(), queries, jets, observer)?
         }
@@ -79,8 +81,8 @@ impl Surroundings {
         are_points: bool,
         checks_curvatures: bool,
         observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
-        let (cloud, neighbours) = (surface.cloud(), surface.sampling().neighbours());
+    ) -> Result<Self> {
+        let (cloud, neighbours) = (surface.cloud(), surface.sampling.neighbours());
         if are_points {
             return Ok(Self::OfPoints);
         }
@@ -98,6 +100,7 @@ impl Surroundings {
 /// A query with what surrounds it.
 #[derive(Clone, Copy)]
 struct Site<'a> {
+    query: usize,
     x: &'a [f64],
     nearest: Neighbour,
     spacing: f64,
@@ -115,10 +118,11 @@ struct Service<'a> {
     surroundings: Surroundings,
 }
 
-/// Room for the gradient and the Hessian of a query.
+/// Room for the gradient and the Hessian of a query, with a buffer for its neighbours.
 struct Slot<'a> {
     gradient: &'a mut [f64],
     hessian: &'a mut [f64],
+    found: &'a mut Vec<Neighbour>,
 }
 
 impl Slot<'_> {
@@ -129,14 +133,13 @@ impl Slot<'_> {
 }
 
 impl Service<'_> {
-    fn serve(&self, observer: &dyn Observer) -> Result<Served, NumericsError> {
+    fn serve(&self, observer: &dyn Observer) -> Result<Served> {
         let (m, d) = (self.queries.n_points(), self.queries.dimension());
         let look = |query| {
             observer.checkpoint()?;
-            Ok(self.needs_offset(query, &self.site(query)))
+            Ok(self.needs_offset(&self.site(query)))
         };
-        let needs_offset: Vec<bool> =
-            (0..m).into_par_iter().map(look).collect::<Result<_, NumericsError>>()?;
+        let needs_offset: Vec<bool> = (0..m).into_par_iter().map(look).collect::<Result<_>>()?;
         let first_unaffordable =
             (0..m).filter(|&query| needs_offset[query]).nth(self.request.max_offsets).unwrap_or(m);
         let (mut gradients, mut hessians) = (vec![0.0; m * d], vec![0.0; m * d * d]);
@@ -146,14 +149,13 @@ impl Service<'_> {
             Vec::new,
             |found, (query, ((gradient, hessian), verdict))| {
                 observer.checkpoint()?;
-                let (site, mut slot) = (self.site(query), Slot { gradient, hessian });
+                let (site, mut slot) = (self.site(query), Slot { gradient, hessian, found });
                 *verdict = match (needs_offset[query], query < first_unaffordable) {
-                    (true, true) => self.by_offset(query, &site, &mut slot, found),
+                    (true, true) => self.by_offset(&site, &mut slot),
                     (true, false) => {
-                        let reason = DegeneracyReason::UnaffordableRescue;
-                        self.without_offset(query, &site, reason, &mut slot, found)
+                        self.without_offset(&site, DegeneracyReason::UnaffordableRescue, &mut slot)
                     }
-                    (false, _) => self.by_signature(query, &site, &mut slot, found),
+                    (false, _) => self.by_signature(&site, &mut slot),
                 };
                 verdict.reason = verdict.reason.or_else(|| self.flag(*verdict, &slot, &site));
                 Ok(())
@@ -168,7 +170,7 @@ impl Service<'_> {
     }
 
     /// Flags the normals of which too little is known.
-    fn flag_normals(&self, served: &mut Served, observer: &dyn Observer) -> Result<(), NumericsError> {
+    fn flag_normals(&self, served: &mut Served, observer: &dyn Observer) -> Result<()> {
         let quadric = |query: usize| self.site(query).quadric;
         let is_doubtful = |&query: &usize| {
             served.verdict(query).reason.is_none() && is_doubtful(served.gradient(query), quadric(query))
@@ -184,7 +186,7 @@ impl Service<'_> {
         let (surface, x) = (self.surface, self.queries.point(query));
         let (nearest, quadric) = match &self.surroundings {
             Surroundings::OfPoints => {
-                (Neighbour { point: query, squared_distance: 0.0 }, surface.quadric(query))
+                (Neighbour { point: query, squared_distance: 0.0 }, surface.quadrics.at(query))
             }
             Surroundings::OfQueries { around, quadrics: Some(quadrics) } => {
                 (around.nearest(query), quadrics.at(query))
@@ -193,98 +195,81 @@ impl Service<'_> {
             // enough.
             Surroundings::OfQueries { around, quadrics: None } => {
                 let nearest = around.nearest(query);
-                let quadric = surface.quadric(nearest.point);
+                let quadric = surface.quadrics.at(nearest.point);
                 (nearest, quadric.map(|quadric| quadric.seen_from(surface.cloud().point(nearest.point), x)))
             }
         };
-        Site { x, nearest, spacing: surface.sampling().spacing(nearest.point), quadric }
+        Site { query, x, nearest, spacing: surface.sampling.spacing(nearest.point), quadric }
     }
 
-    fn needs_offset(&self, query: usize, site: &Site<'_>) -> bool {
+    fn needs_offset(&self, site: &Site<'_>) -> bool {
         match self.request.model {
             SurfaceModel::Signature | SurfaceModel::Local => false,
             SurfaceModel::Offset => true,
-            SurfaceModel::Auto => self.vanishes(query, site) || self.is_weak(query, site),
+            SurfaceModel::Auto => self.vanishes(site) || self.is_weak(site),
         }
     }
 
-    fn vanishes(&self, query: usize, site: &Site<'_>) -> bool {
+    fn vanishes(&self, site: &Site<'_>) -> bool {
         let reach = ON_SURFACE_SPACINGS * site.spacing;
         let quadric = site.quadric.filter(|quadric| quadric.height.abs() <= reach);
         let is_on_thread = site.quadric.is_none()
             && site.nearest.squared_distance <= reach * reach
             && self.surface.is_thread(site.x);
-        is_on_thread || self.is_rounding[query] || is_no_normal(&self.jets, query, site.spacing, quadric)
+        is_on_thread
+            || self.is_rounding[site.query]
+            || is_no_normal(&self.jets, site.query, site.spacing, quadric)
     }
 
     /// Returns whether the offset model is preferred for curvatures: the gradient is weak, and the neighbours
     /// are free of noise. The offset model would interpolate noise.
-    fn is_weak(&self, query: usize, site: &Site<'_>) -> bool {
+    fn is_weak(&self, site: &Site<'_>) -> bool {
         self.request.checks_curvatures
             && site.quadric.is_some_and(|quadric| quadric.is_smooth())
-            && is_weak(&self.jets, query, site.spacing)
+            && is_weak(&self.jets, site.query, site.spacing)
     }
 
-    fn by_signature(
-        &self,
-        query: usize,
-        site: &Site<'_>,
-        slot: &mut Slot<'_>,
-        found: &mut Vec<Neighbour>,
-    ) -> Verdict {
-        if self.request.model == SurfaceModel::Signature && self.vanishes(query, site) {
-            return self.null(query, DegeneracyReason::VanishingGradient, slot);
+    fn by_signature(&self, site: &Site<'_>, slot: &mut Slot<'_>) -> Verdict {
+        if self.request.model == SurfaceModel::Signature && self.vanishes(site) {
+            return self.null(site, DegeneracyReason::VanishingGradient, slot);
         }
-        slot.gradient.copy_from_slice(self.jets.gradient(query));
-        slot.hessian.copy_from_slice(&self.jets.hessian(query));
+        slot.gradient.copy_from_slice(self.jets.gradient(site.query));
+        slot.hessian.copy_from_slice(&self.jets.hessian(site.query));
         let sign = match self.request.orientation {
             Orientation::Gradient => 1.0,
-            Orientation::Outward => self.surface.outward_sign(site.x, slot.gradient, found),
+            Orientation::Outward => self.surface.outward_sign(site.x, slot.gradient, slot.found),
         };
         Verdict { sign, by: ServedBy::Signature, reason: None }
     }
 
     /// Serves a query by the offset model, whose gradient points outward.
-    fn by_offset(
-        &self,
-        query: usize,
-        site: &Site<'_>,
-        slot: &mut Slot<'_>,
-        found: &mut Vec<Neighbour>,
-    ) -> Verdict {
+    fn by_offset(&self, site: &Site<'_>, slot: &mut Slot<'_>) -> Verdict {
         let Some(jet) = offset_jet_at(self.surface, site.x) else {
-            return self.without_offset(query, site, DegeneracyReason::VanishingGradient, slot, found);
+            return self.without_offset(site, DegeneracyReason::VanishingGradient, slot);
         };
         slot.take(&jet);
         let sign = match self.request.orientation {
-            Orientation::Gradient => self.surface.gradient_side(site.x, slot.gradient, found),
+            Orientation::Gradient => self.surface.gradient_side(site.x, slot.gradient, slot.found),
             Orientation::Outward => 1.0,
         };
         Verdict { sign, by: ServedBy::Offset, reason: None }
     }
 
     /// Serves a query without the offset model. A weak gradient is better than nothing.
-    fn without_offset(
-        &self,
-        query: usize,
-        site: &Site<'_>,
-        reason: DegeneracyReason,
-        slot: &mut Slot<'_>,
-        found: &mut Vec<Neighbour>,
-    ) -> Verdict {
-        if self.request.model == SurfaceModel::Auto && !self.vanishes(query, site) {
-            self.by_signature(query, site, slot, found)
+    fn without_offset(&self, site: &Site<'_>, reason: DegeneracyReason, slot: &mut Slot<'_>) -> Verdict {
+        if self.request.model == SurfaceModel::Auto && !self.vanishes(site) {
+            self.by_signature(site, slot)
         } else {
-            self.null(query, reason, slot)
+            self.null(site, reason, slot)
         }
     }
 
-    fn null(&self, query: usize, reason: DegeneracyReason, slot: &mut Slot<'_>) -> Verdict {
+    fn null(&self, site: &Site<'_>, reason: DegeneracyReason, slot: &mut Slot<'_>) -> Verdict {
         let by = match self.request.model {
             SurfaceModel::Offset => ServedBy::Offset,
             SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Local => {
-                slot.gradient.copy_from_slice(self.jets.gradient(query));
-                slot.hessian.copy_from_slice(&self.jets.hessian(query));
+                slot.gradient.copy_from_slice(self.jets.gradient(site.query));
+                slot.hessian.copy_from_slice(&self.jets.hessian(site.query));
                 ServedBy::Signature
             }
         };
@@ -297,13 +282,13 @@ impl Service<'_> {
             return Some(DegeneracyReason::FarFromCloud);
         }
         let has_side = self.request.orientation == Orientation::Outward;
-        if has_side && self.surface.has_ambiguous_side(site.nearest.point) {
+        if has_side && self.surface.oriented.is_ambiguous[site.nearest.point] {
             return Some(DegeneracyReason::AmbiguousSide);
         }
         if !self.request.checks_curvatures {
             return None;
         }
-        if verdict.by == ServedBy::Signature && self.surface.is_too_rough() {
+        if verdict.by == ServedBy::Signature && self.surface.is_too_rough {
             return Some(DegeneracyReason::KernelTooRough);
         }
         (!self.is_resolved(verdict, slot, site)).then_some(DegeneracyReason::UnderResolved)

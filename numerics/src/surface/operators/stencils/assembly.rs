@@ -8,7 +8,7 @@ use super::disc::{Disc, Grading, Site};
 use super::row::{Forms, Row, RowKind};
 use super::sparse::SparseMatrix;
 use super::{Stencils, least_norm, positive, radial};
-use crate::error::NumericsError;
+use crate::error::{NumericsError, Result};
 use crate::machine::eigen::symmetric_eigen;
 use crate::machine::small::{Small, zeros};
 use crate::observer::{Observer, Stage};
@@ -51,7 +51,7 @@ impl Assembly<'_> {
     ///
     /// # Errors
     /// [`NumericsError::DimensionMismatch`], [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
-    pub(super) fn stencils(&self, observer: &dyn Observer) -> Result<Stencils, NumericsError> {
+    pub(super) fn stencils(&self, observer: &dyn Observer) -> Result<Stencils> {
         self.nodes.check_same_dimension(self.queries)?;
         observer.enter(Stage::Evaluate);
         let row = |found: &mut Vec<Neighbour>, query: usize| {
@@ -64,7 +64,7 @@ impl Assembly<'_> {
             }
         };
         let rows = (0..self.queries.n_points()).into_par_iter().map_init(Vec::new, row);
-        let rows: Vec<Row> = rows.collect::<Result<_, NumericsError>>()?;
+        let rows: Vec<Row> = rows.collect::<Result<_>>()?;
         let resolutions = rows.iter().map(|row| row.resolution).collect();
         let kinds = rows.iter().map(|row| row.kind).collect();
         let matrix = SparseMatrix::of(&rows, self.operator.n_components(self.nodes.dimension()));

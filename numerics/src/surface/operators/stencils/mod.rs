@@ -32,7 +32,7 @@ mod sparse;
 use super::super::degeneracy::Resolution;
 use super::super::geometry::Geometry;
 use super::Operator;
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::points::neighbours::Neighbours;
@@ -66,7 +66,7 @@ impl Operator {
     /// not nodes, and in a cloud of one position.
     ///
     /// # Errors
-    /// [`NumericsError::DimensionMismatch`], [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
+    /// `NumericsError::DimensionMismatch`, `NumericsError::Overflow`, `NumericsError::Cancelled`.
     pub fn stencils(
         self,
         geometry: &Geometry,
@@ -74,7 +74,7 @@ impl Operator {
         neighbours: &Neighbours,
         queries: &Cloud,
         observer: &dyn Observer,
-    ) -> Result<Stencils, NumericsError> {
+    ) -> Result<Stencils> {
         let rows = match self {
             Self::LaplaceBeltrami => Rows::Stable,
             Self::SurfaceGradient => Rows::Pointwise,

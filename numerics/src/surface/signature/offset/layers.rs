@@ -9,7 +9,7 @@
 
 use std::sync::Arc;
 
-use crate::error::NumericsError;
+use crate::error::Result;
 use crate::function::interpolant::Interpolant;
 use crate::kernel::{Family, Kernel};
 use crate::machine::small::Small;
@@ -58,8 +58,8 @@ pub(crate) struct OffsetJet {
 /// `normals` are one unit normal per point of the patch, `[k, d]`, consistently oriented.
 ///
 /// # Errors
-/// Returns the errors of the fit, and never [`NumericsError::Cancelled`].
-pub(crate) fn offset_jet(patch: &Patch, normals: &[f64]) -> Result<OffsetJet, NumericsError> {
+/// Returns the errors of the fit, and never `NumericsError::Cancelled`.
+pub(crate) fn offset_jet(patch: &Patch, normals: &[f64]) -> Result<OffsetJet> {
     let d = patch.dimension();
     let delta = OFFSET_SPACINGS * mean_spacing(patch);
     let normals: Vec<f64> = normals.chunks_exact(d).flat_map(|normal| patch.to_frame(normal)).collect();

@@ -28,9 +28,9 @@ const GRADIENT_NORMS: std::ops::Range<f64> = 0.5..2.0;
 /// around it, or the interpolant is no distance.
 pub(crate) fn offset_jet_at(surface: &SignatureSurface, x: &[f64]) -> Option<OffsetJet> {
     let (cloud, d) = (surface.cloud(), surface.cloud().dimension());
-    let nearest = surface.sampling().neighbours().nearest_positions(x, n_patch_points(d));
+    let nearest = surface.sampling.neighbours().nearest_positions(x, n_patch_points(d));
     let first = nearest.first()?;
-    if first.squared_distance > (REACH_SPACINGS * surface.sampling().spacing(first.point)).powi(2) {
+    if first.squared_distance > (REACH_SPACINGS * surface.sampling.spacing(first.point)).powi(2) {
         return None;
     }
     let normal = surface.normal(first.point);
