@@ -20,10 +20,10 @@ from scipy.sparse import csr_matrix
 import gramian
 import gramian.dask
 from gramian.dask.cells.cut import Cut
-from gramian.dask.asking import choose_coarse
 from gramian.dask.cells.parts import Reach, distinct, join, look, rim, split
-from gramian.dask.replicas import Replicas
 from gramian.dask.surface import probe
+from gramian.replicas import Replicas
+from gramian.resources.tiles import choose_coarse
 from gramian.wire.tensors import Array
 
 NOWHERE = "http://127.0.0.1:9"
@@ -117,7 +117,9 @@ def test_points_may_coincide_and_be_few(client: gramian.Client, service: gramian
     points = np.concatenate([points, points[:40]])
     tiles = service.tiles(points, n_tiles)
     (found,) = dask.compute(tiles.curvatures(deviations=True))
-    assert_same(found, client.cloud(points).curvatures(solver="local", deviations=True, hyperparameters=tiles.hyperparameters))
+    assert_same(
+        found, client.cloud(points).curvatures(solver="local", deviations=True, hyperparameters=tiles.hyperparameters)
+    )
 
 
 def test_tiles_without_a_surface_have_no_normals(service: gramian.dask.Service) -> None:
@@ -189,7 +191,7 @@ def test_a_replica_may_die(another: tuple[str, subprocess.Popen[str]], client: g
 
 
 def test_replicas_are_asked_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gramian.dask.replicas.PAUSE_SECONDS", 0.0)
+    monkeypatch.setattr("gramian.replicas.PAUSE_SECONDS", 0.0)
     asked: list[str] = []
 
     def fails(client: gramian.Client) -> None:
@@ -247,7 +249,9 @@ def test_large_clouds_learn_what_they_would_as_a_whole(
     cloud = client.cloud(points)
     learned = cloud.normals(points[:1], solver="local", sites=tiles.plan.sites.points).diagnostics.hyperparameters
     for name in ("length_scale", "variance", "noise_deviation", "radius"):  # up to the order of sums
-        np.testing.assert_allclose(getattr(tiles.hyperparameters, name), getattr(learned, name), rtol=1e-9, err_msg=name)
+        np.testing.assert_allclose(
+            getattr(tiles.hyperparameters, name), getattr(learned, name), rtol=1e-9, err_msg=name
+        )
     assert len(probe(tiles.plan, tiles._points)) == 3000
 
 

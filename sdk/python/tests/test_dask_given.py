@@ -12,7 +12,7 @@ import pytest
 
 import gramian
 import gramian.dask
-from gramian.dask import replicas
+from gramian import replicas
 from gramian.dask.cells import parts, plan
 from gramian.dask.cells.parts import Part, Reach, nearest
 from gramian.wire.tensors import Array

@@ -16,8 +16,8 @@ that answers are those of one request for all points. Which side is outward one 
 order of the points (`Normals`, `Curvatures`, `Interpolation`, `SparseOperator`).
 """
 
+from ..replicas import Replicas
 from .answers import Curvatures, Interpolation, Normals, SparseOperator
-from .replicas import Replicas
 from .service import Service, connect
 from .tiles import Tiles
 

@@ -18,16 +18,9 @@ from .requests import Rows
 
 
 def gathered(tiles: Sequence[Any], chunks: Sequence[int], kinds: Mapping[str, Any]) -> dict[str, da.Array]:
-    """Returns Dask arrays in blocks of so many rows, from what each tile has of them.
+    """Returns Dask arrays in blocks of so many rows, from the `Rows` of tiles, which together have each row once.
 
-    Parameters
-    ----------
-    tiles : sequence of delayed `Rows`
-        Together they have each row once.
-    chunks : sequence of int
-        Rows of each block.
-    kinds : mapping
-        Of each name an array without rows, of the type and the further axes that it is to have.
+    `kinds` has for each name an array without rows, of the type and the further axes that it is to have.
     """
     cells = range(len(tiles))
     bounds = np.concatenate([[0], np.cumsum(chunks)]).tolist()
@@ -60,13 +53,7 @@ def _between(rows: Rows, first: int, last: int) -> Rows:
 
 
 def _in_order(parts: Sequence[Rows], first: int, last: int, kinds: Mapping[str, Any]) -> Rows:
-    """Puts rows of tiles into the order of the input.
-
-    Raises
-    ------
-    RuntimeError
-        If they are not all there.
-    """
+    """Puts rows of tiles into the order of the input. Raises `RuntimeError` if they are not all there."""
     found = [part for part in parts if part]
     index = np.concatenate([part["index"] for part in found]) if found else np.arange(0)
     order = np.argsort(index)

@@ -11,13 +11,13 @@ import numpy as np
 from ..answers import Interpolation
 from ..arguments.fit import Kernel, ValuesFit
 from ..client import Client
+from ..replicas import Replicas
+from ..resources.tiles import choose_coarse
 from ..rest.models import KernelUsed
 from ..rest.types import Unset
 from ..wire.tensors import Array
-from .asking import choose_coarse
 from .cells.parts import Part, Reach, join
 from .cells.plan import Plan, nearest_to
-from .replicas import Replicas
 from .requests import Rows
 
 NEIGHBOURS = 128
@@ -30,19 +30,11 @@ TOGETHER = 16
 
 @dataclass(frozen=True)
 class Law:
-    """The process that values come from.
-
-    Attributes
-    ----------
-    kernel, alpha
-        As they are sent.
-    mean
-        `[0, 1 or d + 1]`. The constant, V, and a slope for each coordinate, V/L.
-    """
+    """The process that values come from."""
 
     kernel: Kernel | KernelUsed
     alpha: float
-    mean: Array
+    mean: Array  # [0, 1 or d + 1]: the constant, V, and a slope for each coordinate, V/L
 
     @classmethod
     def of(cls, replicas: Replicas, plan: Plan, arrays: tuple[da.Array, da.Array], fit: ValuesFit) -> Law:
@@ -79,35 +71,26 @@ class Law:
 
     def mean_at(self, points: Array) -> Array:
         """Returns the mean at points, `[n]`."""
-        if len(self.mean) == 0:
-            return np.zeros(len(points))
-        at_points: Array = self.mean[0] + (points @ self.mean[1:] if len(self.mean) > 1 else np.zeros(len(points)))
+        basis = np.column_stack([np.ones(len(points)), points])
+        at_points: Array = basis[:, : len(self.mean)] @ self.mean
         return at_points
 
     @property
     def reach(self) -> Reach:
         """Which points kriging looks at: the nearest ones as a kernel with a length scale for each axis measures."""
         scales = self.kernel.length_scales
-        stretch = None if scales is None or isinstance(scales, Unset) else tuple(min(scales) / scale for scale in scales)
+        stretch = (
+            None if scales is None or isinstance(scales, Unset) else tuple(min(scales) / scale for scale in scales)
+        )
         return Reach(NEIGHBOURS, are_distinct=False, stretch=stretch)
 
 
 @dataclass(frozen=True)
 class Kriging:
-    """What is asked of every tile.
-
-    Attributes
-    ----------
-    law
-        The process of the values.
-    derivatives
-        0, 1 or 2.
-    deviations
-        Whether standard deviations are wanted.
-    """
+    """What is asked of every tile."""
 
     law: Law
-    derivatives: int
+    derivatives: int  # 0, 1 or 2
     deviations: bool
 
     def kinds(self, dimension: int) -> dict[str, Array]:

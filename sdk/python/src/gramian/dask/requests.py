@@ -11,10 +11,10 @@ from scipy.sparse import csr_matrix
 
 from ..answers import Curvatures, Normals
 from ..client import Client
+from ..replicas import Replicas
 from ..rest.models import Degenerate
 from ..wire.tensors import Array
 from .cells.cut import Ints
-from .replicas import Replicas
 from .surface import Sides, SurfaceTile, Whole
 
 Rows: TypeAlias = dict[str, Any]

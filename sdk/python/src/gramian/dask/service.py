@@ -8,10 +8,10 @@ from collections.abc import Iterable
 import dask.array as da
 import numpy.typing as npt
 
+from ..arguments.blocks import rows_of
 from ..arguments.keywords import suggest_names
 from ..client import DEFAULT_URL
-from .cells import graph
-from .replicas import Replicas
+from ..replicas import Replicas
 from .tiles import Tiles
 
 TILE_POINTS = 250_000
@@ -20,13 +20,7 @@ TILE_POINTS = 250_000
 
 @suggest_names
 class Service:
-    """Servers that answer tiles; `connect` makes one.
-
-    Attributes
-    ----------
-    replicas
-        Their addresses and key, as tasks carry them.
-    """
+    """Servers that answer tiles; `connect` makes one."""
 
     def __init__(self, replicas: Replicas) -> None:
         """Takes the addresses."""
@@ -45,15 +39,8 @@ class Service:
             should be a Dask array that workers read by themselves, in blocks of rows.
         n_tiles : int, optional
             How many tiles; if absent, so many that each has 250,000 points or less. Servers take some million each.
-
-        Raises
-        ------
-        TypeError
-            If they are something else than real numbers.
-        ValueError
-            If there are no points, other axes than these, or a number that is masked or not finite.
         """
-        array = graph.rows_of(points)
+        array = rows_of(points)
         count = -(-len(array) // TILE_POINTS) if n_tiles is None else n_tiles
         if not 1 <= count <= len(array):
             raise ValueError(f"n_tiles must be from 1 to the number of points, {len(array)}, not {count}")
@@ -71,15 +58,10 @@ def connect(urls: str | Iterable[str] | None = None, *, api_key: str | None = No
     urls : str or several, optional
         Their addresses; if absent that of the environment variable `GRAMIAN_URL`, or `http://127.0.0.1:8080`.
     api_key : str, optional
-        A key, where they want one; if absent the environment variable `GRAMIAN_API_KEY` of each worker, as it is there.
-        One that is given is part of the tasks, so that Dask's scheduler and all who see its graphs have it as well.
+        A key, where they want one; if absent the environment variable `GRAMIAN_API_KEY` of each worker. One that is
+        given is part of the tasks, so that Dask's scheduler and all who see its graphs have it as well.
     timeout : float, optional
         Seconds to wait for each next part of an answer; a connection is waited for 10 s at most.
-
-    Raises
-    ------
-    ValueError
-        If there is no address.
     """
     given = os.environ.get("GRAMIAN_URL", DEFAULT_URL) if urls is None else urls
     addresses = (given,) if isinstance(given, str) else tuple(given)

@@ -19,14 +19,14 @@ import numpy as np
 from ..arguments.fit import Fit
 from ..client import Client
 from ..cloud import Cloud
+from ..replicas import Replicas
+from ..resources.tiles import choose_coarse, choose_sides, find_regions
 from ..rest.models import Hyperparameters
 from ..wire.tensors import Array
-from .asking import choose_coarse, choose_sides, find_regions
 from .cells import graph
 from .cells.cut import Ints
 from .cells.parts import Part, Reach, join
 from .cells.plan import Plan, nearest_to
-from .replicas import Replicas
 
 PROBE_POINTS = 60_000
 """Most points of the cloud from which tiles learn. A smaller cloud is learned from as a whole."""
@@ -37,24 +37,12 @@ DIMENSIONS = (2, 3, 4)
 
 @dataclass(frozen=True)
 class Whole:
-    """What all tiles of a surface share.
+    """What all tiles of a surface share."""
 
-    Attributes
-    ----------
-    hyperparameters
-        What local regressions learned.
-    reach
-        How many positions around a point its answers depend on.
-    coarse
-        The coarse cloud, which says which side is outward.
-    fit
-        Kernel and alpha of its signature function.
-    """
-
-    hyperparameters: Hyperparameters
-    reach: int
-    coarse: Part
-    fit: Fit
+    hyperparameters: Hyperparameters  # what local regressions learned
+    reach: int  # how many positions around a point its answers depend on
+    coarse: Part  # the coarse cloud, which says which side is outward
+    fit: Fit  # of its signature function
 
     @classmethod
     def learned(cls, replicas: Replicas, plan: Plan, points: da.Array) -> Whole:
@@ -71,13 +59,12 @@ class Whole:
         return replicas.ask(0, call)
 
     def directions(self, client: Client, points: Array) -> Array:
-        """Computes unit vectors outward by the coarse cloud, `[n, d]`: minus the gradient, never of length 0."""
+        """Computes directions outward by the coarse cloud, `[n, d]`: minus the gradient, never of length 0."""
         cloud = client.cloud(self.coarse.points)
         answer = cloud.interpolate(np.ones(len(self.coarse)), points, derivatives=1, mean="zero", **self.fit)
         directions: Array = -np.asarray(answer.gradients)
-        lengths = np.linalg.norm(directions, axis=1)
-        directions[lengths == 0, 0] = 1
-        return directions / np.where(lengths == 0, 1, lengths)[:, None]
+        directions[(directions == 0).all(axis=1), 0] = 1
+        return directions
 
 
 def probe(plan: Plan, points: da.Array) -> Part:
@@ -100,30 +87,14 @@ def probe(plan: Plan, points: da.Array) -> Part:
 
 @dataclass(frozen=True)
 class SurfaceTile:
-    """A tile with the points around it, and the regions of its surface.
+    """A tile with the points around it, and the regions of its surface."""
 
-    Attributes
-    ----------
-    number
-        The number of the cell.
-    part
-        Its points and those that its answers depend on.
-    own
-        `[m]`. Places of the points of the cell in `part`.
-    directions
-        `[n, d]`. Unit vectors outward by the coarse cloud.
-    labels
-        `[n]`. The region of each point, or −1.
-    regions
-        What the service says of the regions.
-    """
-
-    number: int
-    part: Part
-    own: Ints
-    directions: Array
-    labels: Ints
-    regions: dict[str, Any]
+    number: int  # of its cell
+    part: Part  # its points, and those that its answers depend on
+    own: Ints  # [m]: places of the points of the cell in `part`
+    directions: Array  # [n, d]: outward by the coarse cloud
+    labels: Ints  # [n]: the region of each point, or −1
+    regions: dict[str, Any]  # what the service says of the regions
 
     @property
     def rows(self) -> Ints:
@@ -166,21 +137,17 @@ def prepare(replicas: Replicas, number: int, core: Part, rims: Sequence[Part], w
 
 @dataclass(frozen=True)
 class Sides:
-    """Sides of the regions of a tile: their signs, 1 or −1, `[r]`, and whether these are doubtful, `[r]`."""
+    """Sides of the regions of a tile."""
 
-    signs: Array
-    are_doubtful: Any
+    signs: Array  # [r]: 1 or −1
+    are_doubtful: Any  # [r]
 
 
 def joined(replicas: Replicas, tiles: list[Any], inner: list[Any], outer: list[Any]) -> list[Sides]:
     """Asks for the sides of the regions of all tiles.
 
-    Parameters
-    ----------
-    tiles : list of dict
-        The regions of each tile.
-    inner, outer : list of (`[s]`, `[s]`)
-        Of each tile the points with their regions: its own that others see, and those of others that it sees.
+    `inner` and `outer` are points of each tile with their regions: its own that others see, and those of others that
+    it sees.
     """
     firsts = np.cumsum([0, *[len(tile["regions"]) for tile in tiles]])
     rows, hosts = _numbered(inner, firsts)

@@ -8,15 +8,16 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_matrix
 
+from ..arguments.blocks import aligned, rows_of
 from ..arguments.fit import KernelLike, Mean, Number, ValuesFit
 from ..arguments.keywords import suggest_names
+from ..replicas import Replicas
 from ..rest.models import Hyperparameters
 from . import answers, requests
 from .cells import graph
 from .cells.plan import Plan
 from .gathering import gathered
 from .kriging import Kriging, Law
-from .replicas import Replicas
 from .surface import SurfaceTiles
 
 NO_REASONS = np.empty(0, dtype=requests.REASON)
@@ -31,14 +32,8 @@ class Tiles:
     is cut once.
 
     Answers are those of one request for all points with `solver="local"` and the `hyperparameters` of the tiles, up to
-    ties of distance and the sides of single points. Where the cloud has so much noise that the service regresses on means of
-    points, these are means of other points, and answers differ as those of two samples do, by less than their
-    deviations at most points.
-
-    Attributes
-    ----------
-    plan
-        What tiles have in common: the cells, and samples of the cloud.
+    ties of distance and the sides of single points. Where there is so much noise that the service regresses on means
+    of points, tiles have other means than the cloud. Answers then differ as those of two samples do.
     """
 
     def __init__(self, replicas: Replicas, points: da.Array, n_tiles: int) -> None:
@@ -116,11 +111,11 @@ class Tiles:
         Interpolation
             Dask arrays in the order of the queries.
         """
-        own = graph.aligned(values, self._points)
+        own = aligned(values, self._points)
         fit = ValuesFit(solver="dense", kernel=kernel, alpha=alpha, mean=mean)
         law = Law.of(self._replicas, self.plan, (self._points, own), fit)
         cores = graph.cores(self._points, self.plan, own)
-        asked = self._points if queries is None else graph.rows_of(queries, "queries", self.plan.dimension)
+        asked = self._points if queries is None else rows_of(queries, "queries", self.plan.dimension)
         wanted = cores if queries is None else graph.cores(asked, self.plan)
         rims = graph.rims(cores, self.plan, law.reach, wanted)
         kriging, krige = Kriging(law, derivatives, deviations), dask.delayed(Kriging.krige, pure=True)

@@ -21,21 +21,11 @@ MAX_FOUND = 10_000_000
 
 @dataclass(frozen=True)
 class Part:
-    """Some of the points of a cloud.
+    """Some of the points of a cloud."""
 
-    Attributes
-    ----------
-    index
-        `[n]`, ascending. Their rows in the cloud.
-    points
-        `[n, d]`, L.
-    values
-        `[n]`, V; None where there are none.
-    """
-
-    index: Ints
-    points: Array
-    values: Array | None = None
+    index: Ints  # [n], ascending: rows in the cloud
+    points: Array  # [n, d], L
+    values: Array | None = None  # [n], V
 
     def __len__(self) -> int:
         return len(self.index)
@@ -47,29 +37,19 @@ class Part:
 
 @dataclass(frozen=True)
 class Looking:
-    """Positions that may have neighbours beyond the sides of their cell: `points` `[n, d]` within `radii` `[n]`, L."""
+    """Positions that may have neighbours beyond the sides of their cell."""
 
-    points: Array
-    radii: Array
+    points: Array  # [n, d], L
+    radii: Array  # [n], L: how far the neighbours may be
 
 
 @dataclass(frozen=True)
 class Reach:
-    """Which neighbours count.
+    """Which neighbours count."""
 
-    Attributes
-    ----------
-    count
-        How many of each position.
-    are_distinct
-        Whether points that coincide count once, by the first of them.
-    stretch
-        `[d]`. What coordinates are multiplied with before distances are taken; None for 1.
-    """
-
-    count: int
-    are_distinct: bool = True
-    stretch: tuple[float, ...] | None = None
+    count: int  # of each position
+    are_distinct: bool = True  # whether points that coincide count once, by the first of them
+    stretch: tuple[float, ...] | None = None  # [d]: factors of coordinates before distances are taken
 
     @property
     def factors(self) -> Array | None:

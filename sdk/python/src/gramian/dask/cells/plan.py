@@ -22,28 +22,14 @@ N_SITES = 96
 
 @dataclass(frozen=True)
 class Plan:
-    """What tiles share.
+    """What tiles share."""
 
-    Attributes
-    ----------
-    n_points, dimension
-        n and d of the cloud.
-    cut
-        The cells, one for each tile.
-    sample
-        All points, or some of a large cloud, chosen evenly.
-    sites
-        The points around which tiles learn.
-    extremes
-        Points that span the bounding box.
-    """
-
-    n_points: int
-    dimension: int
-    cut: Cut
-    sample: Part
-    sites: Part
-    extremes: Part
+    n_points: int  # n
+    dimension: int  # d
+    cut: Cut  # a cell for each tile
+    sample: Part  # all points, or some of a large cloud, chosen evenly
+    sites: Part  # points around which tiles learn
+    extremes: Part  # points that span the bounding box
 
     @classmethod
     def of(cls, points: da.Array, n_tiles: int) -> Plan:

@@ -12,8 +12,8 @@ from typing import TypeVar
 
 import httpx
 
-from ..client import Client
-from ..wire.problems import Overloaded, Problem
+from .client import Client
+from .wire.problems import Overloaded, Problem
 
 T = TypeVar("T")
 
@@ -38,21 +38,11 @@ DEADLINE_EXCEEDED = 504
 
 @dataclass(frozen=True)
 class Replicas:
-    """Addresses of servers, as tasks carry them: clients are made by each process that asks.
-
-    Attributes
-    ----------
-    urls
-        Addresses, as for `gramian.Client`.
-    api_key
-        One for all, which travels with the tasks; None for that of the environment of each worker, if it has one.
-    timeout
-        Seconds to wait for each next part of an answer.
-    """
+    """Addresses of servers, as tasks carry them: clients are made by each process that asks."""
 
     urls: tuple[str, ...]
-    api_key: str | None = field(default=None, repr=False)
-    timeout: float = 300.0
+    api_key: str | None = field(default=None, repr=False)  # of all; if None, that of each process's environment
+    timeout: float = 300.0  # seconds to wait for each next part of an answer
 
     def ask(self, first: int, call: Callable[[Client], T]) -> T:
         """Returns what `call` makes of a replica: of number `first`, or of those after it where one does not answer.

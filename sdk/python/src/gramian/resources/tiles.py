@@ -1,4 +1,4 @@
-"""Operations of the service that only tiles need."""
+"""Operations that only clouds in tiles need."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from ..arguments.normalise import REQUEST, Rule
 from ..client import Client
 from ..cloud import Cloud
 from ..rest.models import CoarseResponse, Hyperparameters, SidesResponse
-from ..wire.tensors import JSON, Array, Members
-from .cells.cut import Ints
+from ..wire.tensors import JSON, Array, Integers, Members
 
 REGIONS: Mapping[str, Rule] = {
     **REQUEST,
@@ -22,9 +21,9 @@ REGIONS: Mapping[str, Rule] = {
 }
 
 
-def choose_coarse(client: Client, points: Array, **options: float) -> tuple[Ints, Fit]:
+def choose_coarse(client: Client, points: Array, **options: float) -> tuple[Integers, Fit]:
     """Chooses points that are spread as the cloud is, with kernel and alpha of their signature function."""
-    connection = client._connection  # noqa: SLF001 (of this package)
+    connection = client._connection
     response = connection.post("/v1/coarse", {"points": points, **options}, JSON)
     found = connection.read(CoarseResponse.from_dict, response)
     fit = Fit(solver="dense", kernel=found.kernel, alpha=found.alpha)
@@ -32,22 +31,22 @@ def choose_coarse(client: Client, points: Array, **options: float) -> tuple[Ints
 
 
 def find_regions(
-    cloud: Cloud, own: Ints, coarse: Ints, hyperparameters: Hyperparameters
-) -> tuple[Ints, dict[str, Any]]:
+    cloud: Cloud, own: Integers, coarse: Integers, hyperparameters: Hyperparameters
+) -> tuple[Integers, dict[str, Any]]:
     """Finds the regions of a tile: the region of each point, `[n]`, and what is said of the regions."""
 
-    def read(members: Members) -> tuple[Ints, dict[str, Any]]:
+    def read(members: Members) -> tuple[Integers, dict[str, Any]]:
         regions = {name: members[name] for name in ("regions", "borders", "n_edges")}
         return np.asarray(members["labels"], dtype=np.int64), regions
 
-    return cloud._compute(  # noqa: SLF001 (of this package)
+    return cloud._compute(
         read, "/v1/regions", REGIONS, solver="local", own=own, coarse=coarse, hyperparameters=hyperparameters
     )
 
 
-def choose_sides(client: Client, tiles: list[dict[str, Any]], links: Ints) -> tuple[Array, Any]:
+def choose_sides(client: Client, tiles: list[dict[str, Any]], links: Integers) -> tuple[Array, Any]:
     """Chooses the sides of the regions of all tiles: signs, `[r]`, and whether they are doubtful, `[r]`."""
-    connection = client._connection  # noqa: SLF001 (of this package)
+    connection = client._connection
     response = connection.post("/v1/sides", {"tiles": tiles, "links": links.tolist()}, JSON)
     found = connection.read(SidesResponse.from_dict, response)
     return np.array(found.signs, dtype=np.float64), np.array(found.are_doubtful, dtype=bool)
