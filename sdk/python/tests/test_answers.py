@@ -59,7 +59,7 @@ def sparse(value: Any) -> list[Any]:
 
 
 def assert_same(answer: Answer, other: Answer) -> None:
-    for field in dataclasses.fields(answer):  # type: ignore[arg-type]
+    for field in dataclasses.fields(answer):
         value, again = getattr(answer, field.name), getattr(other, field.name)
         for matrix, other_matrix in zip(sparse(value), sparse(again), strict=True):
             np.testing.assert_array_equal(matrix.toarray(), other_matrix.toarray())
