@@ -58,8 +58,7 @@ def _with_options(function: Callable[..., object]) -> tuple[Signature, str | Non
     if last.kind is not Parameter.VAR_KEYWORD:
         return signature, function.__doc__
     [options] = get_args(get_type_hints(function)[last.name])
-    for name, hint in options.__annotations__.items():
-        annotation = getattr(hint, "__forward_arg__", hint)
+    for name, annotation in _annotations(options).items():
         parameters.append(Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=annotation))
     head, returns, tail = inspect.cleandoc(function.__doc__ or "").partition("\n\nReturns\n-------\n")
     return signature.replace(parameters=parameters), "\n".join([head, *_descriptions(options)]) + returns + tail
@@ -71,10 +70,16 @@ def _descriptions(options: type) -> list[str]:
     A `TypedDict` does not know its bases, but these are in the module where it is defined.
     """
     found: dict[str, str] = {}
+    wanted = _annotations(options)
     for base in filter(is_typeddict, vars(sys.modules[options.__module__]).values()):
         _, _, keys = inspect.cleandoc(base.__doc__ or "").partition("Keys\n----\n")
         for entry in re.findall(r"^\w.*(?:\n    .*)*", keys, re.MULTILINE):
             name = entry.partition(" : ")[0]
-            if base.__annotations__[name] == options.__annotations__.get(name):
+            if _annotations(base)[name] == wanted.get(name):
                 found[name] = entry
-    return [found[name] for name in options.__annotations__ if name in found]
+    return [found[name] for name in wanted if name in found]
+
+
+def _annotations(kind: type) -> dict[str, object]:
+    """Returns the annotations of a `TypedDict` as they are written."""
+    return {name: getattr(hint, "__forward_arg__", hint) for name, hint in kind.__annotations__.items()}

@@ -37,8 +37,8 @@ class SurfaceOperatorFit(SurfaceFit, total=False):
     Keys
     ----
     geometry : Geometry, dict, Cloud or Diagnostics, optional
-        The surface, if it has another cloud or fit than the values. Its options that are absent are those of
-        the values, except that an absent `alpha` is that of `Cloud.normals`.
+        The surface, if it has another cloud or fit than the values. Options absent from it are those given
+        here for the values, or else as `Cloud.normals` chooses them.
     """
 
     geometry: GeometryLike | None

@@ -61,8 +61,8 @@ class OperatorsOnCloud(RegisteredCloud):
     ) -> SurfaceGradientMatrix:
         """Assembles the matrices, one per coordinate, that turn values at the points into surface gradients.
 
-        There are no values to learn from: an absent `kernel` is chosen from the cloud, `alpha` is then 1e-10, and
-        `mean` zero. With a constant mean the matrix maps constants exactly to 0. The solver is dense.
+        There are no values to learn from. If absent, `kernel` is chosen from the cloud, `alpha` is 1e-10 and
+        `mean` is zero. With a constant mean the matrix maps constants exactly to 0. The solver is dense.
         `gramian.OperatorFit` describes the options.
 
         Parameters
@@ -162,8 +162,8 @@ class OperatorsOnCloud(RegisteredCloud):
     ) -> LaplaceBeltramiMatrix:
         """Assembles the matrix that turns values at the points into Δu at the queries.
 
-        There are no values to learn from: an absent `kernel` is chosen from the cloud, `alpha` is then 1e-10, and
-        `mean` zero. With a constant mean the matrix maps constants exactly to 0. The solver is dense.
+        There are no values to learn from. If absent, `kernel` is chosen from the cloud, `alpha` is 1e-10 and
+        `mean` is zero. With a constant mean the matrix maps constants exactly to 0. The solver is dense.
         `gramian.OperatorFit` describes the options.
 
         Parameters

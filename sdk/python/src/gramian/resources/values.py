@@ -22,7 +22,8 @@ class ValuesOfCloud(RegisteredCloud):
     ) -> Interpolation:
         """Fits `u = Σ λ_j k(·, x_j)` to values, (K + αI)Λ = Y, and evaluates it.
 
-        With `alpha=0` u equals the values at the points exactly. `gramian.InterpolationOptions` describes the options.
+        With `alpha=0` u equals the values at the points exactly. `gramian.InterpolationOptions` describes the
+        options.
 
         Parameters
         ----------
