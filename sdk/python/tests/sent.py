@@ -45,6 +45,7 @@ METHODS: dict[str, dict[str, Any]] = {
 QUERYING = [method for method in METHODS if method != "select_model"]
 BATCHES = [method for method in METHODS if method.endswith("_batch")]
 OPERATORS = [method for method in METHODS if "surface_gradient" in method or "laplace" in method]
+SURFACES = ["normals", "curvatures", *OPERATORS]
 
 
 class Sent(Exception):

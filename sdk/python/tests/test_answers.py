@@ -16,7 +16,9 @@ from sent import CIRCLE, METHODS, OPERATORS, QUERYING, VALUES
 import gramian
 from gramian import Geometry, Kernel
 from gramian.answers import Answer
+from gramian.answers.fit import operator_fit_used, surface_fit_used
 from gramian.rest.types import UNSET, Unset
+from gramian.wire.tensors import Members
 
 every_method = pytest.mark.parametrize("method", QUERYING)
 every_operator = pytest.mark.parametrize("method", OPERATORS)
@@ -59,7 +61,7 @@ def sparse(value: Any) -> list[Any]:
 
 
 def assert_same(answer: Answer, other: Answer) -> None:
-    for field in dataclasses.fields(answer):  # type: ignore[arg-type]
+    for field in dataclasses.fields(answer):
         value, again = getattr(answer, field.name), getattr(other, field.name)
         for matrix, other_matrix in zip(sparse(value), sparse(again), strict=True):
             np.testing.assert_array_equal(matrix.toarray(), other_matrix.toarray())
@@ -158,6 +160,15 @@ def test_the_diagnostics_of_a_fit_with_noise_do_not_say_all(cloud: Any, method: 
             ask(cloud, method, geometry=geometry)
     with pytest.raises(ValueError, match=r"^alpha is absent from these diagnostics"):
         ask(cloud, method, kernel=said.kernel, alpha=said.alpha)
+
+
+def test_given_hyperparameters_are_part_of_the_fit(cloud: Any) -> None:
+    learned = {"noise_deviation": 0.01}
+    said = {"diagnostics": cloud.normals().diagnostics.to_dict()}
+    for used in [surface_fit_used, operator_fit_used]:
+        assert "hyperparameters" not in used(Members({}, said, {"cloud": {"id": cloud.id}}))
+        request = {"cloud": {"id": cloud.id}, "hyperparameters": learned}
+        assert used(Members({}, said, request))["hyperparameters"] == learned
 
 
 # Starts of a search.

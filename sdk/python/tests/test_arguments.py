@@ -15,7 +15,7 @@ from typing import Any, SupportsFloat
 import numpy as np
 import numpy.typing as npt
 import pytest
-from sent import BATCHES, CIRCLE, LISTS, METHODS, OPERATORS, QUERYING, VALUES, client, cloud, posted, sent
+from sent import BATCHES, CIRCLE, LISTS, METHODS, OPERATORS, QUERYING, SURFACES, VALUES, client, cloud, posted, sent
 
 import gramian
 from gramian import Geometry, Kernel, KernelFamily, SolverChoice, SolverUsed
@@ -24,6 +24,7 @@ from gramian.rest.types import UNSET
 
 every_method = pytest.mark.parametrize("method", METHODS)
 every_operator = pytest.mark.parametrize("method", OPERATORS)
+every_surface = pytest.mark.parametrize("method", SURFACES)
 
 
 class Foreign:
@@ -785,6 +786,29 @@ def test_a_geometry_may_be_of_another_cloud(method: str) -> None:
         Geometry(kernal="gauss")  # type: ignore[call-arg]
 
 
+# Hyperparameters
+
+
+@every_surface
+def test_hyperparameters_are_sent_as_they_were_reported(method: str) -> None:
+    learned = {"noise_deviation": 0.01, "of_a_later_version": [1, {"two": None}]}
+    assert sent(method, hyperparameters=learned)["hyperparameters"] == learned
+    assert sent(method, hyperparameters=MappingProxyType(learned))["hyperparameters"] == learned
+    model = models.Samples(count=3, seed=1)  # any model of the service
+    assert sent(method, hyperparameters=model)["hyperparameters"] == {"count": 3, "seed": 1}
+    with pytest.raises(
+        TypeError, match=r"^hyperparameters is to be the diagnostics\.hyperparameters of an answer, not"
+    ):
+        sent(method, hyperparameters="learned")
+
+
+@every_method
+def test_only_normals_take_sites_and_only_surfaces_hyperparameters(method: str) -> None:
+    parameters = inspect.signature(getattr(gramian.Cloud, method)).parameters
+    assert ("sites" in parameters) == (method == "normals")
+    assert ("hyperparameters" in parameters) == (method in SURFACES)
+
+
 # Absence
 
 
@@ -802,6 +826,7 @@ def test_none_is_as_absent_everywhere(method: str, absent: object) -> None:
         "normals": ["surface", "orientation"],
     }.get(method, [])
     names += ["geometry"] if method in OPERATORS else []
+    names += ["hyperparameters"] if method in SURFACES else []
     assert sent(method, **dict.fromkeys(names, absent), alpha=None) == sent(method)
     if method in OPERATORS:
         nothing = {"cloud": absent, "kernel": absent, "noise_variances": absent, "solver": absent, "surface": absent}

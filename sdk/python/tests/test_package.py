@@ -78,7 +78,13 @@ OPERATIONS: dict[str, Callable[[Cloud], object]] = {
         QUERIES, kernel=GAUSS, surface="signature", orientation="gradient", solver=None
     ),
     "curvatures": lambda cloud: cloud.curvatures(QUERIES, kernel=GAUSS, alpha=0),
+    "normals nowhere": lambda cloud: cloud.normals([[0, 0]], kernel=GAUSS, alpha=0),
     "curvatures nowhere": lambda cloud: cloud.curvatures([[0, 0]], kernel=GAUSS, alpha=0),
+    "gradients nowhere": lambda cloud: cloud.surface_gradient(squares(cloud), [[0, 0]], kernel=GAUSS, deviations=True),
+    "matrices nowhere": lambda cloud: cloud.surface_gradient_matrix([[0, 0]], kernel=GAUSS),
+    "matrix nowhere": lambda cloud: cloud.laplace_beltrami_matrix([[0, 0]], kernel=GAUSS),
+    "sparse matrices nowhere": lambda cloud: cloud.surface_gradient_sparse_matrix([[0, 0]], kernel=GAUSS),
+    "sparse matrix nowhere": lambda cloud: cloud.laplace_beltrami_sparse_matrix([[0, 0]], kernel=GAUSS),
     "surface_gradient": lambda cloud: cloud.surface_gradient(squares(cloud), QUERIES, kernel=GAUSS),
     "surface_gradient_matrix": lambda cloud: cloud.surface_gradient_matrix(QUERIES, kernel=GAUSS),
     "laplace_beltrami": lambda cloud: cloud.laplace_beltrami(squares(cloud), QUERIES, kernel=GAUSS),

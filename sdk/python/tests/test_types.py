@@ -17,7 +17,7 @@ import attrs
 import pytest
 
 from gramian import rest
-from gramian.arguments import fit
+from gramian.arguments import fit, keywords, options
 from gramian.resources import selection
 from gramian.rest import api, models
 from gramian.rest.types import File, Response, Unset
@@ -156,6 +156,14 @@ def test_plain_strings_are_those_of_the_enumeration(alias: types.UnionType) -> N
     assert used in ([], [models.SolverUsed])  # the solver that an answer reports can be sent back
     assert typing.get_origin(strings) is Literal
     assert set(get_args(strings)) == {member.value for member in enumeration}
+
+
+def test_every_option_is_described() -> None:
+    kinds = [kind for kind in vars(options).values() if typing.is_typeddict(kind)]
+    assert len(kinds) > 7
+    for kind in kinds:
+        described = [entry.partition(" : ")[0] for entry in keywords._descriptions(kind)]
+        assert described == list(kind.__annotations__)
 
 
 def test_what_may_be_free_is_the_enumeration() -> None:

@@ -31,16 +31,15 @@ from .answers import (
     SurfaceGradientMatrix,
     SurfaceGradientSparseMatrix,
 )
-from .arguments.fit import (
-    Fit,
-    Geometry,
-    GeometryFields,
-    GeometryLike,
-    Kernel,
-    KernelFields,
-    KernelLike,
+from .arguments.fit import Fit, Geometry, GeometryFields, GeometryLike, Kernel, KernelFields, KernelLike, ValuesFit
+from .arguments.options import (
+    InterpolationOptions,
     OperatorFit,
-    ValuesFit,
+    OperatorOptions,
+    PosteriorOptions,
+    SurfaceFit,
+    SurfaceOperatorFit,
+    SurfaceOptions,
 )
 from .client import Client
 from .cloud import Cloud
@@ -97,6 +96,7 @@ __all__ = [
     "GeometryLike",
     "Interpolation",
     "InterpolationBatch",
+    "InterpolationOptions",
     "Kernel",
     "KernelDescription",
     "KernelFamily",
@@ -111,10 +111,12 @@ __all__ = [
     "Normals",
     "NotPositiveDefinite",
     "OperatorFit",
+    "OperatorOptions",
     "OrientationChoice",
     "Overloaded",
     "Posterior",
     "PosteriorBatch",
+    "PosteriorOptions",
     "PosteriorQuantity",
     "Problem",
     "SelectionCriterion",
@@ -123,9 +125,12 @@ __all__ = [
     "SolverChoice",
     "SolverUsed",
     "SurfaceChoice",
+    "SurfaceFit",
     "SurfaceGradient",
     "SurfaceGradientMatrix",
     "SurfaceGradientSparseMatrix",
+    "SurfaceOperatorFit",
+    "SurfaceOptions",
     "SurfaceUsed",
     "UnknownCloud",
     "Unset",

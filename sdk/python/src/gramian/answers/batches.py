@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
 
-from ..arguments.fit import ValuesFit, batch_fit_used
+from ..arguments.fit import ValuesFit
 from ..rest.models import Diagnostics
-from ..wire.tensors import Array, Members
-from .answer import Answer
+from ..wire.tensors import Array
+from .values import ValuesAnswer
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class InterpolationBatch(Answer):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class InterpolationBatch(ValuesAnswer):
     """Functions through lists of values (close to them, if `alpha` > 0), at the queries.
 
     Deviations do not depend on the values, so they hold for each function.
@@ -42,36 +41,18 @@ class InterpolationBatch(Answer):
     """
 
     values: Array
-    gradients: Array | None
-    hessians: Array | None
-    value_deviations: Array | None
-    gradient_deviations: Array | None
-    hessian_deviations: Array | None
-    mean_coefficients: Array | None
+    gradients: Array | None = None
+    hessians: Array | None = None
+    value_deviations: Array | None = None
+    gradient_deviations: Array | None = None
+    hessian_deviations: Array | None = None
+    mean_coefficients: Array | None = None
     diagnostics: Diagnostics
     fit: ValuesFit
 
-    @classmethod
-    def read(cls, members: Members) -> Self:
-        """Reads the answer of `/v1/interpolation/batch`."""
-        diagnostics = members.diagnostics
-        m, d = diagnostics.n_queries, diagnostics.dimension
-        mean_coefficients = members.optional_arrays("mean_coefficients")
-        return cls(
-            values=members.array("values", m),
-            gradients=members.optional("gradients", m, d),
-            hessians=members.optional("hessians", m, d, d),
-            value_deviations=members.optional("value_deviations"),
-            gradient_deviations=members.optional("gradient_deviations", d),
-            hessian_deviations=members.optional("hessian_deviations", d, d),
-            mean_coefficients=mean_coefficients,
-            diagnostics=diagnostics,
-            fit=batch_fit_used(diagnostics, members.request, mean_coefficients),
-        )
 
-
-@dataclass(frozen=True, eq=False, repr=False)
-class PosteriorBatch(Answer):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class PosteriorBatch(ValuesAnswer):
     """Gaussian processes given lists of values, at the queries. Quantities that were not requested are None.
 
     Quantities that depend on the values have a row for each list. The lists share all others.
@@ -109,37 +90,15 @@ class PosteriorBatch(Answer):
     """
 
     means: Array
-    variances: Array | None
-    observation_variances: Array | None
-    covariance: Array | None
-    gradients: Array | None
-    gradient_variances: Array | None
-    samples: Array | None
-    quantiles: Array | None
-    exceedance_probabilities: Array | None
-    log_marginal_likelihoods: Array | None
-    mean_coefficients: Array | None
+    variances: Array | None = None
+    observation_variances: Array | None = None
+    covariance: Array | None = None
+    gradients: Array | None = None
+    gradient_variances: Array | None = None
+    samples: Array | None = None
+    quantiles: Array | None = None
+    exceedance_probabilities: Array | None = None
+    log_marginal_likelihoods: Array | None = None
+    mean_coefficients: Array | None = None
     diagnostics: Diagnostics
     fit: ValuesFit
-
-    @classmethod
-    def read(cls, members: Members) -> Self:
-        """Reads the answer of `/v1/posterior/batch`."""
-        diagnostics = members.diagnostics
-        m, d = diagnostics.n_queries, diagnostics.dimension
-        mean_coefficients = members.optional_arrays("mean_coefficients")
-        return cls(
-            means=members.array("means", m),
-            variances=members.optional("variances"),
-            observation_variances=members.optional("observation_variances"),
-            covariance=members.optional("covariance", m),
-            gradients=members.optional("gradients", m, d),
-            gradient_variances=members.optional("gradient_variances", d),
-            samples=members.optional_arrays("samples", m),
-            quantiles=members.optional_arrays("quantiles", m),
-            exceedance_probabilities=members.optional("exceedance_probabilities", m),
-            log_marginal_likelihoods=members.optional("log_marginal_likelihoods"),
-            mean_coefficients=mean_coefficients,
-            diagnostics=diagnostics,
-            fit=batch_fit_used(diagnostics, members.request, mean_coefficients),
-        )

@@ -5,18 +5,28 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
-from ..arguments.fit import OperatorFit, operator_fit_used
+from ..arguments.options import OperatorFit, SurfaceOperatorFit
 from ..rest.models import Degenerate, Diagnostics
 from ..wire.tensors import Array, Members
 from .answer import Answer
+from .fit import operator_fit_used
 from .sparse import csr_matrices
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class SurfaceGradient(Answer):
+class OperatorAnswer(Answer):
+    """The base class of answers about operators on a surface."""
+
+    @classmethod
+    def read(cls, members: Members, **derived: object) -> Self:
+        """Reads an answer and the options of its fit."""
+        return super().read(members, fit=operator_fit_used(members), **derived)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class SurfaceGradient(OperatorAnswer):
     """Surface gradients ∇u − (∇u·ν)ν of the values at the queries.
 
     Attributes
@@ -36,23 +46,14 @@ class SurfaceGradient(Answer):
     """
 
     gradients: Array
-    gradient_deviations: Array | None
+    gradient_deviations: Array | None = None
     degenerate: tuple[Degenerate, ...]
     diagnostics: Diagnostics
     fit: OperatorFit
 
-    @classmethod
-    def read(cls, members: Members) -> Self:
-        """Reads the answer of `/v1/surface-gradient`."""
-        diagnostics = members.diagnostics
-        fit = operator_fit_used(diagnostics, members.request)
-        d = diagnostics.dimension
-        deviations = members.optional("gradient_deviations", d)
-        return cls(members.array("gradients", d), deviations, members.degenerate, diagnostics, fit)
 
-
-@dataclass(frozen=True, eq=False, repr=False)
-class SurfaceGradientMatrix(Answer):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class SurfaceGradientMatrix(OperatorAnswer):
     """The surface gradient as matrices, one per coordinate.
 
     Attributes
@@ -73,16 +74,9 @@ class SurfaceGradientMatrix(Answer):
     diagnostics: Diagnostics
     fit: OperatorFit
 
-    @classmethod
-    def read(cls, members: Members) -> Self:
-        """Reads the answer of `/v1/surface-gradient/matrix`."""
-        diagnostics = members.diagnostics
-        fit = operator_fit_used(diagnostics, members.request)
-        return cls(members.arrays("matrices", diagnostics.n_points), members.degenerate, diagnostics, fit)
 
-
-@dataclass(frozen=True, eq=False, repr=False)
-class SurfaceGradientSparseMatrix(Answer):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class SurfaceGradientSparseMatrix(OperatorAnswer):
     """The surface gradient as sparse matrices, one per coordinate.
 
     Attributes
@@ -102,18 +96,16 @@ class SurfaceGradientSparseMatrix(Answer):
     matrices: list[csr_matrix]
     degenerate: tuple[Degenerate, ...]
     diagnostics: Diagnostics
-    fit: OperatorFit
+    fit: SurfaceOperatorFit
 
     @classmethod
-    def read(cls, members: Members) -> Self:
-        """Reads the answer of `/v1/surface-gradient/sparse-matrix`."""
-        diagnostics = members.diagnostics
-        fit = operator_fit_used(diagnostics, members.request)
-        return cls(csr_matrices(members), members.degenerate, diagnostics, fit)
+    def read(cls, members: Members, **derived: object) -> Self:
+        """Reads an answer and makes matrices of SciPy of it."""
+        return super().read(members, matrices=csr_matrices(members), **derived)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class LaplaceBeltrami(Answer):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class LaplaceBeltrami(OperatorAnswer):
     """The Laplace–Beltrami operator of the values at the queries: on the unit circle Δ cos θ = −cos θ.
 
     Attributes
@@ -133,22 +125,14 @@ class LaplaceBeltrami(Answer):
     """
 
     values: Array
-    value_deviations: Array | None
+    value_deviations: Array | None = None
     degenerate: tuple[Degenerate, ...]
     diagnostics: Diagnostics
     fit: OperatorFit
 
-    @classmethod
-    def read(cls, members: Members) -> Self:
-        """Reads the answer of `/v1/laplace-beltrami`."""
-        diagnostics = members.diagnostics
-        fit = operator_fit_used(diagnostics, members.request)
-        deviations = members.optional("value_deviations")
-        return cls(members.array("values"), deviations, members.degenerate, diagnostics, fit)
 
-
-@dataclass(frozen=True, eq=False, repr=False)
-class LaplaceBeltramiMatrix(Answer):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class LaplaceBeltramiMatrix(OperatorAnswer):
     """The Laplace–Beltrami operator as a matrix: on the unit circle `matrix @ cos θ` is −cos θ.
 
     Attributes
@@ -169,16 +153,9 @@ class LaplaceBeltramiMatrix(Answer):
     diagnostics: Diagnostics
     fit: OperatorFit
 
-    @classmethod
-    def read(cls, members: Members) -> Self:
-        """Reads the answer of `/v1/laplace-beltrami/matrix`."""
-        diagnostics = members.diagnostics
-        fit = operator_fit_used(diagnostics, members.request)
-        return cls(members.array("matrix", diagnostics.n_points), members.degenerate, diagnostics, fit)
 
-
-@dataclass(frozen=True, eq=False, repr=False)
-class LaplaceBeltramiSparseMatrix(Answer):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class LaplaceBeltramiSparseMatrix(OperatorAnswer):
     """The Laplace–Beltrami operator as a sparse matrix: on the unit circle `matrix @ cos θ` is −cos θ.
 
     Attributes
@@ -197,12 +174,10 @@ class LaplaceBeltramiSparseMatrix(Answer):
     matrix: csr_matrix
     degenerate: tuple[Degenerate, ...]
     diagnostics: Diagnostics
-    fit: OperatorFit
+    fit: SurfaceOperatorFit
 
     @classmethod
-    def read(cls, members: Members) -> Self:
-        """Reads the answer of `/v1/laplace-beltrami/sparse-matrix`."""
-        diagnostics = members.diagnostics
-        fit = operator_fit_used(diagnostics, members.request)
+    def read(cls, members: Members, **derived: object) -> Self:
+        """Reads an answer and makes matrices of SciPy of it."""
         [matrix] = csr_matrices(members)
-        return cls(matrix, members.degenerate, diagnostics, fit)
+        return super().read(members, matrix=matrix, **derived)

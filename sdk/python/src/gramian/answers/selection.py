@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Self
 
-from ..arguments.fit import ValuesFit, selected_fit, values_fit_used
+from ..arguments.fit import ValuesFit
 from ..rest.models import Diagnostics, FamilyScore, KernelUsed
 from ..wire.tensors import Array, Members
 from .answer import Answer
+from .fit import selected_fit
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class AlphaPath(Answer):
     """The criterion over alpha, with everything else as selected.
 
@@ -29,12 +30,13 @@ class AlphaPath(Answer):
     scores: Array
 
     @classmethod
-    def read(cls, members: Members) -> Self:
-        """Reads this part of the answer of `/v1/model-selection`."""
-        return cls(alphas=members.column("path", "alpha"), scores=members.column("path", "score"))
+    def read(cls, members: Members, **derived: object) -> Self:
+        """Reads a list of objects as one array for each of their members."""
+        columns = {f"{name}s": [entry.get(name) for entry in members["path"]] for name in ("alpha", "score")}
+        return super().read(Members({}, columns, members.request), **derived)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class LeaveOneOut(Answer):
     """Predictions of each value from all others, with the selected kernel and noise.
 
@@ -54,18 +56,8 @@ class LeaveOneOut(Answer):
     variances: Array
     log_predictive_densities: Array
 
-    @classmethod
-    def read(cls, members: Members) -> Self:
-        """Reads this part of the answer of `/v1/model-selection`."""
-        left_out = members.within("leave_one_out")
-        return cls(
-            means=left_out.array("means"),
-            variances=left_out.array("variances"),
-            log_predictive_densities=left_out.array("log_predictive_densities"),
-        )
 
-
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ModelSelection(Answer):
     """The kernel and the noise that explain values best.
 
@@ -100,8 +92,8 @@ class ModelSelection(Answer):
     """
 
     kernel: KernelUsed
-    alpha: float | None
-    mean_coefficients: Array | None
+    alpha: float | None = None
+    mean_coefficients: Array | None = None
     score: float
     gradient: Array
     converged: bool
@@ -113,21 +105,8 @@ class ModelSelection(Answer):
     fit: ValuesFit
 
     @classmethod
-    def read(cls, members: Members) -> Self:
+    def read(cls, members: Members, **derived: object) -> Self:
         """Reads the answer of `/v1/model-selection`."""
-        fields, diagnostics = members.fields, members.diagnostics
-        kernel, alpha = KernelUsed.from_dict(fields["kernel"]), fields.get("alpha")
-        return cls(
-            kernel=kernel,
-            alpha=alpha,
-            mean_coefficients=members.optional("mean_coefficients"),
-            score=fields["score"],
-            gradient=members.array("gradient"),
-            converged=fields["converged"],
-            evaluations=fields["evaluations"],
-            families=tuple(FamilyScore.from_dict(entry) for entry in fields["families"]),
-            path=AlphaPath.read(members),
-            leave_one_out=LeaveOneOut.read(members),
-            diagnostics=diagnostics,
-            fit=selected_fit(values_fit_used(diagnostics, members.request), kernel, alpha),
-        )
+        left_out = Members({}, members["leave_one_out"], members.request)
+        parts = {"path": AlphaPath.read(members), "leave_one_out": LeaveOneOut.read(left_out)}
+        return super().read(members, fit=selected_fit(members), **parts, **derived)

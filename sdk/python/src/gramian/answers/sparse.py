@@ -29,7 +29,7 @@ def csr_matrices(members: Members) -> list[csr_matrix]:
     """Reads the matrices of an answer, one per component, with their entries at the same places."""
     from scipy.sparse import csr_matrix
 
-    *_, m, n = members.integers("shape").tolist()
+    *components, m, n = members.integers("shape").tolist()
     indptr, indices = members.integers("indptr"), members.integers("indices")
-    data = members.array("data", len(indices)) if len(members.integers("shape")) == 3 else members.array("data")[None]
+    data = members.array("data").reshape(*components or [1], len(indices))
     return [csr_matrix((entries, indices, indptr), shape=(m, n)) for entries in data]

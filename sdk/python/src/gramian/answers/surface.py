@@ -5,14 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Self
 
-from ..arguments.fit import Fit, fit_used
+from ..arguments.options import SurfaceFit
 from ..rest.models import Degenerate, Diagnostics, SurfaceUsed
 from ..wire.tensors import Array, Members
 from .answer import Answer
+from .fit import surface_fit_used
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Normals(Answer):
+class SurfaceAnswer(Answer):
+    """The base class of answers about a surface."""
+
+    @classmethod
+    def read(cls, members: Members, **derived: object) -> Self:
+        """Reads an answer and the options of its fit."""
+        return super().read(members, fit=surface_fit_used(members), **derived)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Normals(SurfaceAnswer):
     """Unit normals of the surface at the queries. Deviations are None unless requested.
 
     Attributes
@@ -40,29 +50,14 @@ class Normals(Answer):
     gradient_norms: Array
     levels: Array
     surfaces: tuple[SurfaceUsed, ...]
-    normal_deviations: Array | None
+    normal_deviations: Array | None = None
     degenerate: tuple[Degenerate, ...]
     diagnostics: Diagnostics
-    fit: Fit
-
-    @classmethod
-    def read(cls, members: Members) -> Self:
-        """Reads the answer of `/v1/normals`."""
-        diagnostics = members.diagnostics
-        return cls(
-            normals=members.array("normals", diagnostics.dimension),
-            gradient_norms=members.array("gradient_norms"),
-            levels=members.array("levels"),
-            surfaces=_surfaces(members),
-            normal_deviations=members.optional("normal_deviations"),
-            degenerate=members.degenerate,
-            diagnostics=diagnostics,
-            fit=fit_used(diagnostics, members.request),
-        )
+    fit: SurfaceFit
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Curvatures(Answer):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Curvatures(SurfaceAnswer):
     """Curvatures of the surface at the queries.
 
     With outward normals, a sphere of radius r has +1/r everywhere. Deviations are None unless requested.
@@ -111,37 +106,10 @@ class Curvatures(Answer):
     gradient_norms: Array
     levels: Array
     surfaces: tuple[SurfaceUsed, ...]
-    normal_deviations: Array | None
-    principal_curvature_deviations: Array | None
-    mean_curvature_deviations: Array | None
-    gaussian_curvature_deviations: Array | None
+    normal_deviations: Array | None = None
+    principal_curvature_deviations: Array | None = None
+    mean_curvature_deviations: Array | None = None
+    gaussian_curvature_deviations: Array | None = None
     degenerate: tuple[Degenerate, ...]
     diagnostics: Diagnostics
-    fit: Fit
-
-    @classmethod
-    def read(cls, members: Members) -> Self:
-        """Reads the answer of `/v1/curvatures`."""
-        diagnostics = members.diagnostics
-        d = diagnostics.dimension
-        return cls(
-            principal_curvatures=members.array("principal_curvatures", d - 1),
-            principal_directions=members.array("principal_directions", d - 1, d),
-            mean_curvatures=members.array("mean_curvatures"),
-            gaussian_curvatures=members.array("gaussian_curvatures"),
-            normals=members.array("normals", d),
-            gradient_norms=members.array("gradient_norms"),
-            levels=members.array("levels"),
-            surfaces=_surfaces(members),
-            normal_deviations=members.optional("normal_deviations"),
-            principal_curvature_deviations=members.optional("principal_curvature_deviations", d - 1),
-            mean_curvature_deviations=members.optional("mean_curvature_deviations"),
-            gaussian_curvature_deviations=members.optional("gaussian_curvature_deviations"),
-            degenerate=members.degenerate,
-            diagnostics=diagnostics,
-            fit=fit_used(diagnostics, members.request),
-        )
-
-
-def _surfaces(members: Members) -> tuple[SurfaceUsed, ...]:
-    return tuple(SurfaceUsed(name) for name in members.fields["surfaces"])
+    fit: SurfaceFit

@@ -5,14 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Self
 
-from ..arguments.fit import ValuesFit, values_fit_used
+from ..arguments.fit import ValuesFit
 from ..rest.models import Diagnostics
 from ..wire.tensors import Array, Members
 from .answer import Answer
+from .fit import values_fit_used
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Interpolation(Answer):
+class ValuesAnswer(Answer):
+    """The base class of answers about functions through values."""
+
+    @classmethod
+    def read(cls, members: Members, **derived: object) -> Self:
+        """Reads an answer and the options of its fit."""
+        return super().read(members, fit=values_fit_used(members), **derived)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Interpolation(ValuesAnswer):
     """A function u through the values (close to them, if `alpha` > 0), at the queries.
 
     Attributes
@@ -33,32 +43,17 @@ class Interpolation(Answer):
     """
 
     values: Array
-    gradients: Array | None
-    hessians: Array | None
-    value_deviations: Array | None
-    gradient_deviations: Array | None
-    hessian_deviations: Array | None
+    gradients: Array | None = None
+    hessians: Array | None = None
+    value_deviations: Array | None = None
+    gradient_deviations: Array | None = None
+    hessian_deviations: Array | None = None
     diagnostics: Diagnostics
     fit: ValuesFit
 
-    @classmethod
-    def read(cls, members: Members) -> Self:
-        """Reads the answer of `/v1/interpolation`."""
-        d = members.diagnostics.dimension
-        return cls(
-            values=members.array("values"),
-            gradients=members.optional("gradients", d),
-            hessians=members.optional("hessians", d, d),
-            value_deviations=members.optional("value_deviations"),
-            gradient_deviations=members.optional("gradient_deviations", d),
-            hessian_deviations=members.optional("hessian_deviations", d, d),
-            diagnostics=members.diagnostics,
-            fit=values_fit_used(members.diagnostics, members.request),
-        )
 
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Posterior(Answer):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Posterior(ValuesAnswer):
     """A Gaussian process given the values, at the queries. Quantities that were not requested are None.
 
     Attributes
@@ -90,33 +85,14 @@ class Posterior(Answer):
     """
 
     means: Array
-    variances: Array | None
-    observation_variances: Array | None
-    covariance: Array | None
-    gradients: Array | None
-    gradient_variances: Array | None
-    samples: Array | None
-    quantiles: Array | None
-    exceedance_probabilities: Array | None
-    log_marginal_likelihood: float | None
+    variances: Array | None = None
+    observation_variances: Array | None = None
+    covariance: Array | None = None
+    gradients: Array | None = None
+    gradient_variances: Array | None = None
+    samples: Array | None = None
+    quantiles: Array | None = None
+    exceedance_probabilities: Array | None = None
+    log_marginal_likelihood: float | None = None
     diagnostics: Diagnostics
     fit: ValuesFit
-
-    @classmethod
-    def read(cls, members: Members) -> Self:
-        """Reads the answer of `/v1/posterior`."""
-        diagnostics = members.diagnostics
-        return cls(
-            means=members.array("means"),
-            variances=members.optional("variances"),
-            observation_variances=members.optional("observation_variances"),
-            covariance=members.optional("covariance", diagnostics.n_queries),
-            gradients=members.optional("gradients", diagnostics.dimension),
-            gradient_variances=members.optional("gradient_variances", diagnostics.dimension),
-            samples=members.optional("samples", diagnostics.n_queries),
-            quantiles=members.optional("quantiles", diagnostics.n_queries),
-            exceedance_probabilities=members.optional("exceedance_probabilities"),
-            log_marginal_likelihood=members.fields.get("log_marginal_likelihood"),
-            diagnostics=diagnostics,
-            fit=values_fit_used(diagnostics, members.request),
-        )

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, Required, SupportsFloat, TypeAlias, TypedDict, cast
+from typing import TYPE_CHECKING, Any, Literal, Required, SupportsFloat, TypeAlias, TypedDict, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +24,6 @@ from ..rest.models import (
     SurfaceChoice,
 )
 from ..rest.types import Unset
-from ..wire.tensors import Array
 from .describe import described
 from .keywords import suggest_names
 from .normalise import KERNEL, normalise
@@ -61,6 +59,17 @@ Quantity: TypeAlias = (
         "log_marginal_likelihood",
     ]
 )
+
+
+class KernelParameters(TypedDict, total=False):
+    """The parameters of a kernel. `Kernel` documents them."""
+
+    length_scale: Number | None
+    length_scales: npt.ArrayLike | Unset | None
+    variance: Number | None
+    epsilon: Number | None
+    nu: Number | None
+    smoothness: Whole | Unset | None
 
 
 @suggest_names
@@ -104,21 +113,9 @@ class Kernel:
     nu: float | None
     smoothness: int | None
 
-    def __init__(
-        self,
-        family: Family,
-        *,
-        length_scale: Number | None = None,
-        length_scales: npt.ArrayLike | Unset | None = None,
-        variance: Number | None = None,
-        epsilon: Number | None = None,
-        nu: Number | None = None,
-        smoothness: Whole | Unset | None = None,
-    ) -> None:
+    def __init__(self, family: Family, **parameters: Unpack[KernelParameters]) -> None:
         """Takes the parameters that the family allows. The attributes describe them."""
-        scales = {"length_scale": length_scale, "length_scales": length_scales}
-        numbers = {"variance": variance, "epsilon": epsilon, "nu": nu, "smoothness": smoothness}
-        given: dict[str, Any] = normalise({"family": family, **scales, **numbers}, KERNEL, path="kernel.")
+        given: dict[str, Any] = normalise({"family": family, **parameters}, KERNEL, path="kernel.")
         given["family"] = KernelFamily(given["family"])
         if "length_scales" in given:
             given["length_scales"] = tuple(given["length_scales"].tolist())
@@ -129,16 +126,10 @@ class Kernel:
         return described("Kernel", vars(self))
 
 
-class KernelFields(TypedDict, total=False):
+class KernelFields(KernelParameters, total=False):
     """A kernel as a dictionary: `{"family": "gauss", "length_scale": 2.0}`. `Kernel` documents the keys."""
 
     family: Required[Family]
-    length_scale: Number | None
-    length_scales: npt.ArrayLike | None
-    variance: Number | None
-    epsilon: Number | None
-    nu: Number | None
-    smoothness: Whole | None
 
 
 KernelLike: TypeAlias = Family | Kernel | KernelUsed | KernelFields | models.Kernel | KernelDescription
@@ -149,22 +140,27 @@ class Fit(TypedDict, total=False):
     """Options for fitting a function at the n points of a cloud, as keywords: `cloud.normals(**fit)`.
 
     The `fit` of an answer has all options as they were used. Every option may be absent, and None means
-    absent.
+    absent. V is the unit of the values. A surface has none.
 
     Keys
     ----
-    kernel
-        The kernel. Chosen from the cloud if absent, and reported in `diagnostics.kernel`.
-    alpha
-        Number added to the diagonal of the Gram matrix, unit of the values squared. 0 interpolates, the noise
-        variance regresses. If absent, 1e-10 where a kernel is given. Otherwise it is chosen by the noise of
-        the values or, for surfaces, of the points.
-    noise_variances
-        `[n]`, the noise variance at each point, instead of `alpha`.
-    solver
-        The solver of the linear system. `"auto"` if absent.
-    duplicates
-        The policy for points that coincide when alpha is 0: `"refuse"` (if absent) or `"merge"`.
+    kernel : str, dict or Kernel, optional
+        A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
+        dictionary), or the `diagnostics.kernel` of an answer. If absent, learned from the values by their
+        likelihood, with its variance and the noise. Without values, as for a surface, chosen from the cloud.
+        `diagnostics` reports it.
+    alpha : float, optional
+        Number added to the diagonal of the Gram matrix, V². 0 interpolates, the noise variance regresses. If
+        absent, 1e-10 where `kernel` is given, else learned from the values. For a surface, chosen by the
+        noise of the points, at least 1e-3.
+    noise_variances : array_like, `[n]`, optional
+        The noise variance at each point, V², instead of `alpha`.
+    solver : str, optional
+        `"dense"`; `"local"` to answer each query from the points nearest to it, for any number of points; or
+        `"auto"` (if absent) to let the service choose. Local regressions of surfaces take neither `kernel`
+        nor `alpha`.
+    duplicates : str, optional
+        Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
     """
 
     kernel: KernelLike | None
@@ -172,6 +168,19 @@ class Fit(TypedDict, total=False):
     noise_variances: npt.ArrayLike | None
     solver: Solver | None
     duplicates: Duplicates | None
+
+
+class ValuesFit(Fit, total=False):
+    """Options for fitting a function to values, as keywords: `cloud.interpolate(values, **fit)`.
+
+    Keys
+    ----
+    mean : str, optional
+        Mean of the function, beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates. If
+        absent, a constant where `kernel` is learned, else zero.
+    """
+
+    mean: Mean | None
 
 
 @suggest_names
@@ -222,117 +231,3 @@ class GeometryFields(TypedDict, total=False):
 
 GeometryLike: TypeAlias = "Geometry | GeometryFields | Diagnostics | RegisteredCloud"
 """A surface: a `Geometry`, a dictionary, another cloud, or what `diagnostics.geometry` reports."""
-
-
-class ValuesFit(Fit, total=False):
-    """Options for fitting a function to values, as keywords: `cloud.interpolate(values, **fit)`.
-
-    Keys
-    ----
-    mean
-        The mean, the part of the function beside the kernel: `"zero"`, `"constant"` or `"linear"`.
-    """
-
-    mean: Mean | None
-
-
-class OperatorFit(ValuesFit, total=False):
-    """Options for fitting a function and a surface, as keywords: `cloud.laplace_beltrami(values, **fit)`.
-
-    Keys
-    ----
-    geometry
-        The surface, where it differs from the fit of the values.
-    """
-
-    geometry: GeometryLike | None
-
-
-def fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> Fit:
-    """Returns the fit of a surface as used, from an answer's diagnostics and its request."""
-    fit = _numbers_used(diagnostics, request)
-    if diagnostics.solver is SolverUsed.LOCAL:  # local regressions choose these by likelihood, and take none
-        fit.pop("kernel", None)
-        fit.pop("alpha", None)
-        fit.pop("noise_variances", None)
-    return fit
-
-
-def values_fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> ValuesFit:
-    """Returns the fit of values as used, with the mean if there is one.
-
-    Unlike for surfaces, the local solver for values takes a kernel, so the kernel is kept.
-    """
-    mean = diagnostics.mean_coefficients
-    return _with_mean(_numbers_used(diagnostics, request), 0 if isinstance(mean, Unset) else len(mean))
-
-
-def batch_fit_used(diagnostics: Diagnostics, request: Mapping[str, Any], mean_coefficients: Array | None) -> ValuesFit:
-    """Returns the fit of many lists of values as used. `mean_coefficients` has a row for each list."""
-    fit = _numbers_used(diagnostics, request)
-    return _with_mean(fit, 0 if mean_coefficients is None else mean_coefficients.shape[-1])
-
-
-def selected_fit(start: ValuesFit, kernel: KernelUsed, alpha: float | None) -> ValuesFit:
-    """Returns the fit with which a search ended, from the one with which it began."""
-    fit = start.copy()
-    fit["kernel"] = kernel
-    if alpha is not None:
-        fit["alpha"] = alpha
-    return fit
-
-
-def _with_mean(fit: Fit, n_coefficients: int) -> ValuesFit:
-    values_fit = cast("ValuesFit", fit)
-    if n_coefficients:
-        values_fit["mean"] = MeanChoice.CONSTANT if n_coefficients == 1 else MeanChoice.LINEAR
-    return values_fit
-
-
-def _numbers_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> Fit:
-    fit = Fit(kernel=diagnostics.kernel, solver=diagnostics.solver)
-    if isinstance(diagnostics.alpha, Unset):
-        fit["noise_variances"] = _own_copy(request.get("noise_variances"))
-    else:
-        fit["alpha"] = diagnostics.alpha
-    if "duplicates" in request:
-        fit["duplicates"] = DuplicatePolicy(request["duplicates"])
-    return fit
-
-
-def operator_fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> OperatorFit:
-    """Returns the fit of values as used, with the fit of the surface."""
-    fit, surface = values_fit_used(diagnostics, request), diagnostics.geometry
-    if isinstance(surface, Unset):  # by stencils, which fit nothing to the values
-        surface = diagnostics
-        fit = ValuesFit(solver=SolverChoice.LOCAL)
-        if "duplicates" in request:
-            fit["duplicates"] = DuplicatePolicy(request["duplicates"])
-    asked = request.get("geometry", {})
-    noise_variances = asked.get("noise_variances", request.get("noise_variances"))
-    cloud = None if surface.cloud_id == request["cloud"]["id"] else surface.cloud_id
-    choice = SurfaceChoice(asked["surface"]) if "surface" in asked else None
-    if surface.solver is SolverUsed.LOCAL:
-        # A local surface takes no kernel, not even that of the values. So the service chose the kernel of the
-        # values, and will choose it again.
-        fit.pop("kernel", None)
-        fit.pop("alpha", None)
-        return OperatorFit(**fit, geometry=Geometry(cloud=cloud, solver=surface.solver, surface=choice))
-    geometry = Geometry(
-        cloud=cloud,
-        kernel=surface.kernel,
-        alpha=None if isinstance(surface.alpha, Unset) else surface.alpha,
-        noise_variances=_own_copy(noise_variances) if isinstance(surface.alpha, Unset) else None,
-        solver=surface.solver,
-        surface=choice,
-    )
-    return OperatorFit(**fit, geometry=geometry)
-
-
-def _own_copy(numbers: npt.ArrayLike | None) -> npt.NDArray[np.float64] | None:
-    """Returns a read-only copy of numbers, which the caller cannot change."""
-    if numbers is None:
-        return None
-    copy = np.array(numbers, dtype=np.float64)
-    copy.flags.writeable = False
-    return copy

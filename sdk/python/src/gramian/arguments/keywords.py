@@ -1,11 +1,17 @@
-"""Errors for misspelt keywords that name the nearest parameter, as Python's own do from version 3.13 on."""
+"""Keywords of methods: errors for misspelt ones, and descriptions of those that several methods share.
+
+Errors name the nearest parameter, as Python's own do from version 3.13 on.
+"""
 
 from __future__ import annotations
 
 import functools
 import inspect
+import re
+import sys
 from collections.abc import Callable
-from typing import ParamSpec, TypeVar
+from inspect import Parameter, Signature
+from typing import ParamSpec, TypeVar, get_args, get_type_hints, is_typeddict
 
 from .normalise import KERNEL
 from .scalars import nearest
@@ -16,7 +22,11 @@ T = TypeVar("T")
 
 
 def suggest_names(cls: C) -> C:
-    """Makes the constructor and public methods of a class suggest the parameter that was probably meant."""
+    """Makes the constructor and public methods of a class suggest the parameter that was probably meant.
+
+    If a method takes the keys of a `TypedDict`, `**options: Unpack[…]`, they appear in its signature and its
+    docstring, so that `help` shows them.
+    """
     for name, member in list(vars(cls).items()):
         if inspect.isfunction(member) and (name == "__init__" or not name.startswith("_")):
             setattr(cls, name, _suggesting(member))
@@ -24,7 +34,8 @@ def suggest_names(cls: C) -> C:
 
 
 def _suggesting(function: Callable[P, T]) -> Callable[P, T]:
-    names = [name for name in inspect.signature(function).parameters if name != "self"]
+    signature, doc = _with_options(function)
+    names = [name for name in signature.parameters if name != "self"]
     called = function.__qualname__.removesuffix(".__init__").rpartition(".")[2]
 
     @functools.wraps(function)
@@ -35,4 +46,40 @@ def _suggesting(function: Callable[P, T]) -> Callable[P, T]:
                 raise TypeError(f"{called}() has no parameter {name!r}{advice}")
         return function(*args, **kwargs)
 
+    checked.__signature__ = signature  # type: ignore[attr-defined]  # which inspect reads
+    checked.__doc__ = doc
     return checked
+
+
+def _with_options(function: Callable[..., object]) -> tuple[Signature, str | None]:
+    """Returns the signature and the docstring of a function, with the keys of its `**options`."""
+    signature = inspect.signature(function)
+    *parameters, last = signature.parameters.values()
+    if last.kind is not Parameter.VAR_KEYWORD:
+        return signature, function.__doc__
+    [options] = get_args(get_type_hints(function)[last.name])
+    for name, annotation in _annotations(options).items():
+        parameters.append(Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=annotation))
+    head, returns, tail = inspect.cleandoc(function.__doc__ or "").partition("\n\nReturns\n-------\n")
+    return signature.replace(parameters=parameters), "\n".join([head, *_descriptions(options)]) + returns + tail
+
+
+def _descriptions(options: type) -> list[str]:
+    """Returns the entries about the keys of a `TypedDict`, from its docstring and those of its bases.
+
+    A `TypedDict` does not know its bases, but these are in the module where it is defined.
+    """
+    found: dict[str, str] = {}
+    wanted = _annotations(options)
+    for base in filter(is_typeddict, vars(sys.modules[options.__module__]).values()):
+        _, _, keys = inspect.cleandoc(base.__doc__ or "").partition("Keys\n----\n")
+        for entry in re.findall(r"^\w.*(?:\n    .*)*", keys, re.MULTILINE):
+            name = entry.partition(" : ")[0]
+            if _annotations(base)[name] == wanted.get(name):
+                found[name] = entry
+    return [found[name] for name in wanted if name in found]
+
+
+def _annotations(kind: type) -> dict[str, object]:
+    """Returns the annotations of a `TypedDict` as they are written."""
+    return {name: getattr(hint, "__forward_arg__", hint) for name, hint in kind.__annotations__.items()}

@@ -10,6 +10,7 @@
 | a truth | `bool`, of Python or NumPy |
 | a kernel | a family, a mapping, `Kernel`, or what `diagnostics.kernel` or `Client.kernels()` reports |
 | a geometry | `Geometry`, a mapping, another `Cloud`, or what `diagnostics.geometry` reports |
+| hyperparameters | a mapping, or what `diagnostics.hyperparameters` reports |
 | free parameters | a mapping to bounds, or a list of mappings with `parameter`, `min` and `max` |
 
 Numbers are sent unchanged, as float64. Complex numbers, truth values, text, masked entries, NaN and infinity
@@ -123,12 +124,14 @@ def words(*words: str) -> Rule:
     return lambda name, value, _: as_words(name, value, known)
 
 
-def with_deviations(include: object, deviations: object) -> object:
-    """Returns `include`, with `"deviations"` added if the argument `deviations` is true."""
+def with_deviations(fields: Mapping[str, object]) -> dict[str, object]:
+    """Returns the fields with `"deviations"` in `include` instead of the argument `deviations`."""
+    others = {name: value for name, value in fields.items() if name != "deviations"}
+    deviations, include = fields.get("deviations"), fields.get("include")
     if _is_absent(deviations) or not as_truth("deviations", deviations):
-        return include
+        return others
     wanted = [] if _is_absent(include) else as_words("include", include, GeometryInclude)
-    return list(dict.fromkeys([*wanted, GeometryInclude.DEVIATIONS.value]))
+    return {**others, "include": list(dict.fromkeys([*wanted, GeometryInclude.DEVIATIONS.value]))}
 
 
 def samples(name: str, value: object, sizes: Sizes) -> dict[str, object]:
@@ -212,6 +215,15 @@ def cloud(name: str, value: object, sizes: Sizes) -> dict[str, object]:  # noqa:
     return {"id": str(found)}
 
 
+def hyperparameters(name: str, value: object, sizes: Sizes) -> dict[str, object]:  # noqa: ARG001
+    """Applies the rule for hyperparameters: a mapping, or what diagnostics report."""
+    found = value.to_dict() if hasattr(value, "to_dict") else value
+    if not isinstance(found, Mapping):
+        kind = type(value).__name__
+        raise TypeError(f"{name} is to be the diagnostics.hyperparameters of an answer, not of the type {kind}")
+    return dict(found)
+
+
 def duration(name: str, value: object, sizes: Sizes) -> float:
     """Applies the rule for seconds, which may be infinite."""
     seconds = math.inf if isinstance(value, float) and value == math.inf else number(name, value, sizes)
@@ -260,6 +272,7 @@ REQUEST: Mapping[str, Rule] = {
     "values": array("n"),
     "queries": array("m", "d"),
     "sites": array("s", "d"),
+    "hyperparameters": hyperparameters,
     "derivatives": whole,
     "mean": word(*MeanChoice),
     "include": words(*PosteriorQuantity),

@@ -10,7 +10,7 @@ from ..wire.connection import Connection
 from ..wire.problems import UnknownCloud
 from ..wire.tensors import JSON, PLY, Array, Members
 from ..wire.transport import about
-from .normalise import REQUEST, Rule, normalise
+from .normalise import REQUEST, Rule, normalise, with_deviations
 
 T = TypeVar("T")
 
@@ -83,7 +83,7 @@ class RegisteredCloud:
         The request is then repeated once: the ids in it are still right.
         """
         sizes = {"n": self.n_points, "d": self.dimension}
-        request = {"cloud": {"id": self.id}, **normalise(fields, rules, sizes)}
+        request = {"cloud": {"id": self.id}, **normalise(with_deviations(fields), rules, sizes)}
         try:
             return self._connection.compute(path, request, read, self.id)
         except UnknownCloud:

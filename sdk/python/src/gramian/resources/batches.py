@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from typing import Unpack
 
 import numpy.typing as npt
 
 from ..answers import InterpolationBatch, PosteriorBatch
-from ..arguments.fit import Deviations, Duplicates, KernelLike, Mean, Number, Quantity, Solver, Whole
 from ..arguments.keywords import suggest_names
-from ..arguments.normalise import BATCH, GEOMETRIC_BATCH, with_deviations
+from ..arguments.normalise import BATCH, GEOMETRIC_BATCH
+from ..arguments.options import InterpolationOptions, PosteriorOptions
 from ..arguments.registration import RegisteredCloud
 
 
@@ -18,23 +18,13 @@ class BatchesOnCloud(RegisteredCloud):
     """The part of `Cloud` that concerns many lists of values at its points. V is their unit."""
 
     def interpolate_batch(
-        self,
-        values: npt.ArrayLike,
-        queries: npt.ArrayLike | None = None,
-        *,
-        derivatives: Whole | None = None,
-        include: Deviations | Iterable[Deviations] | None = None,
-        deviations: bool | None = None,
-        kernel: KernelLike | None = None,
-        alpha: Number | None = None,
-        mean: Mean | None = None,
-        noise_variances: npt.ArrayLike | None = None,
-        solver: Solver | None = None,
-        duplicates: Duplicates | None = None,
+        self, values: npt.ArrayLike, queries: npt.ArrayLike | None = None, **options: Unpack[InterpolationOptions]
     ) -> InterpolationBatch:
         """Fits a function to each of k lists of values, with one factorization for all, and evaluates them.
 
-        Each function is the one that `interpolate` fits to its list with the same kernel and noise.
+        Each function is the one that `interpolate` fits to its list with the same kernel and noise. An absent
+        kernel is learned from all lists together. The solver is dense. `gramian.InterpolationOptions`
+        describes the options.
 
         Parameters
         ----------
@@ -42,28 +32,6 @@ class BatchesOnCloud(RegisteredCloud):
             A row for each list, with a value at each point, in their order, unit V.
         queries : array_like, `[m, d]`, optional
             Positions at which to evaluate the functions, a row of coordinates each. The points if absent.
-        derivatives : 0, 1 or 2, optional
-            1 for gradients, 2 for Hessians as well. 0 if absent.
-        include : str or several, optional
-            Additional results: `"deviations"`. Nothing if absent.
-        deviations : bool, optional
-            True for standard deviations, as by `include="deviations"`.
-        kernel : str, dict or Kernel, optional
-            A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
-            dictionary), or the `diagnostics.kernel` of an answer. If absent, learned from all lists together
-            by their likelihood, with its variance and the noise, and reported in `diagnostics`.
-        alpha : float, optional
-            Number added to the diagonal of the Gram matrix, V². 0 interpolates, the noise variance regresses.
-            If absent, 1e-10 where `kernel` is given, else learned from the values.
-        mean : str, optional
-            Mean of each function, beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the
-            coordinates. If absent, a constant where `kernel` is absent too, else zero.
-        noise_variances : array_like, `[n]`, optional
-            The noise variance at each point, V², instead of `alpha`.
-        solver : str, optional
-            `"dense"` or `"auto"`, which mean the same here. `"auto"` if absent.
-        duplicates : str, optional
-            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
 
         Returns
         -------
@@ -87,36 +55,17 @@ class BatchesOnCloud(RegisteredCloud):
             GEOMETRIC_BATCH,
             values=values,
             queries=queries,
-            derivatives=derivatives,
-            include=with_deviations(include, deviations),
-            kernel=kernel,
-            alpha=alpha,
-            mean=mean,
-            noise_variances=noise_variances,
-            solver=solver,
-            duplicates=duplicates,
+            **options,
         )
 
     def posterior_batch(
-        self,
-        values: npt.ArrayLike,
-        queries: npt.ArrayLike | None = None,
-        *,
-        include: Quantity | Iterable[Quantity] | None = None,
-        samples: Whole | Mapping[str, Whole] | None = None,
-        quantiles: npt.ArrayLike | None = None,
-        threshold: Number | None = None,
-        kernel: KernelLike | None = None,
-        alpha: Number | None = None,
-        mean: Mean | None = None,
-        noise_variances: npt.ArrayLike | None = None,
-        solver: Solver | None = None,
-        duplicates: Duplicates | None = None,
+        self, values: npt.ArrayLike, queries: npt.ArrayLike | None = None, **options: Unpack[PosteriorOptions]
     ) -> PosteriorBatch:
         """Computes the posteriors of k Gaussian processes with one kernel, noise and factorization.
 
         Each posterior is the one that `posterior` computes from its list of values. Variances and covariances
-        do not depend on values, so all lists share them.
+        do not depend on values, so all lists share them. An absent kernel is learned from all lists together.
+        The solver is dense. `gramian.PosteriorOptions` describes the options.
 
         Parameters
         ----------
@@ -124,32 +73,6 @@ class BatchesOnCloud(RegisteredCloud):
             A row for each list, with a value at each point, in their order, unit V.
         queries : array_like, `[m, d]`, optional
             Positions at which to evaluate the posteriors, a row of coordinates each. The points if absent.
-        include : str or several, optional
-            Additional results beside the means: `"variance"`, `"observation_variance"`, `"covariance"`,
-            `"gradients"`, `"gradient_variances"`, `"log_marginal_likelihood"`. Nothing if absent.
-        samples : int or dict, optional
-            Number of functions to draw from each posterior, jointly at all queries, or
-            `{"count": 10, "seed": 1}`.
-        quantiles : array_like, `[q]`, optional
-            Probabilities between 0 and 1 for which to return quantiles of the latent functions.
-        threshold : float, optional
-            Threshold of `exceedance_probabilities`, V: the probabilities that a new observation exceeds it.
-        kernel : str, dict or Kernel, optional
-            A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
-            dictionary), or the `diagnostics.kernel` of an answer. If absent, learned from all lists together
-            by their likelihood, with its variance and the noise, and reported in `diagnostics`.
-        alpha : float, optional
-            Number added to the diagonal of the Gram matrix, V². 0 interpolates, the noise variance regresses.
-            If absent, 1e-10 where `kernel` is given, else learned from the values.
-        mean : str, optional
-            Mean of each function, beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the
-            coordinates. If absent, a constant where `kernel` is absent too, else zero.
-        noise_variances : array_like, `[n]`, optional
-            The noise variance at each point, V², instead of `alpha`.
-        solver : str, optional
-            `"dense"` or `"auto"`, which mean the same here. `"auto"` if absent.
-        duplicates : str, optional
-            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
 
         Returns
         -------
@@ -167,19 +90,5 @@ class BatchesOnCloud(RegisteredCloud):
                [2.99, 0.  ]]), array([0.01, 1.  ]))
         """
         return self._compute(
-            PosteriorBatch.read,
-            "/v1/posterior/batch",
-            BATCH,
-            values=values,
-            queries=queries,
-            include=include,
-            samples=samples,
-            quantiles=quantiles,
-            threshold=threshold,
-            kernel=kernel,
-            alpha=alpha,
-            mean=mean,
-            noise_variances=noise_variances,
-            solver=solver,
-            duplicates=duplicates,
+            PosteriorBatch.read, "/v1/posterior/batch", BATCH, values=values, queries=queries, **options
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from typing import Unpack
 
 import numpy.typing as npt
 
@@ -15,9 +15,9 @@ from ..answers import (
     SurfaceGradientSparseMatrix,
 )
 from ..answers.sparse import require_scipy
-from ..arguments.fit import Deviations, Duplicates, GeometryLike, KernelLike, Mean, Number, Solver
 from ..arguments.keywords import suggest_names
-from ..arguments.normalise import GEOMETRIC, with_deviations
+from ..arguments.normalise import GEOMETRIC
+from ..arguments.options import OperatorFit, OperatorOptions, SurfaceOperatorFit
 from ..arguments.registration import RegisteredCloud
 
 
@@ -26,21 +26,11 @@ class OperatorsOnCloud(RegisteredCloud):
     """The part of `Cloud` that concerns operators on the surface of its points. V is the unit of values."""
 
     def surface_gradient(
-        self,
-        values: npt.ArrayLike,
-        queries: npt.ArrayLike | None = None,
-        *,
-        geometry: GeometryLike | None = None,
-        include: Deviations | Iterable[Deviations] | None = None,
-        deviations: bool | None = None,
-        kernel: KernelLike | None = None,
-        alpha: Number | None = None,
-        mean: Mean | None = None,
-        noise_variances: npt.ArrayLike | None = None,
-        solver: Solver | None = None,
-        duplicates: Duplicates | None = None,
+        self, values: npt.ArrayLike, queries: npt.ArrayLike | None = None, **options: Unpack[OperatorOptions]
     ) -> SurfaceGradient:
         """Computes the tangential part ∇u − (∇u·ν)ν of the gradient of the function through values.
+
+        `gramian.OperatorOptions` describes the options.
 
         Parameters
         ----------
@@ -48,31 +38,6 @@ class OperatorsOnCloud(RegisteredCloud):
             Values at the points, in their order, unit V.
         queries : array_like, `[m, d]`, optional
             Positions on the surface, a row of coordinates each. The points of the surface's cloud if absent.
-        geometry : Geometry, dict, Cloud or Diagnostics, optional
-            The surface, if it has another cloud or fit than the values.
-        include : str or several, optional
-            Additional results: `"deviations"`. Nothing if absent.
-        deviations : bool, optional
-            True for standard deviations, as by `include="deviations"`.
-        kernel : str, dict or Kernel, optional
-            A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
-            dictionary), or the `diagnostics.kernel` of an answer. If absent, learned from the values by their
-            likelihood, with its variance and the noise, and chosen from the cloud for the surface.
-            `diagnostics` reports it.
-        alpha : float, optional
-            Number added to the diagonal of the Gram matrix, V². 0 interpolates, the noise variance regresses.
-            If absent, 1e-10 where `kernel` is given, else learned from the values. If given, it applies to
-            the surface too. If absent, the surface has the default of `Cloud.normals`.
-        mean : str, optional
-            Mean of u, beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates. If absent,
-            a constant where `kernel` is absent too, else zero.
-        noise_variances : array_like, `[n]`, optional
-            The noise variance at each point, V², instead of `alpha`.
-        solver : str, optional
-            `"dense"`; `"local"` for weights of the points near each query, without `kernel` or `alpha` and
-            for any number of points; or `"auto"` (if absent) to let the service choose.
-        duplicates : str, optional
-            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
 
         Returns
         -------
@@ -88,58 +53,22 @@ class OperatorsOnCloud(RegisteredCloud):
         array([[ 0.36, -0.48]])
         """
         return self._compute(
-            SurfaceGradient.read,
-            "/v1/surface-gradient",
-            GEOMETRIC,
-            values=values,
-            queries=queries,
-            geometry=geometry,
-            include=with_deviations(include, deviations),
-            kernel=kernel,
-            alpha=alpha,
-            mean=mean,
-            noise_variances=noise_variances,
-            solver=solver,
-            duplicates=duplicates,
+            SurfaceGradient.read, "/v1/surface-gradient", GEOMETRIC, values=values, queries=queries, **options
         )
 
     def surface_gradient_matrix(
-        self,
-        queries: npt.ArrayLike | None = None,
-        *,
-        geometry: GeometryLike | None = None,
-        kernel: KernelLike | None = None,
-        alpha: Number | None = None,
-        mean: Mean | None = None,
-        noise_variances: npt.ArrayLike | None = None,
-        solver: Solver | None = None,
-        duplicates: Duplicates | None = None,
+        self, queries: npt.ArrayLike | None = None, **options: Unpack[OperatorFit]
     ) -> SurfaceGradientMatrix:
         """Assembles the matrices, one per coordinate, that turn values at the points into surface gradients.
+
+        There are no values to learn from. If absent, `kernel` is chosen from the cloud, `alpha` is 1e-10 and
+        `mean` is zero. With a constant mean the matrix maps constants exactly to 0. The solver is dense.
+        `gramian.OperatorFit` describes the options.
 
         Parameters
         ----------
         queries : array_like, `[m, d]`, optional
             Positions on the surface, a row of coordinates each. The points of the surface's cloud if absent.
-        geometry : Geometry, dict, Cloud or Diagnostics, optional
-            The surface, if it has another cloud or fit than the values.
-        kernel : str, dict or Kernel, optional
-            A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
-            dictionary), or the `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and
-            reported in `diagnostics`.
-        alpha : float, optional
-            Number added to the diagonal of the Gram matrix, V². 0 interpolates, the noise variance regresses.
-            1e-10 for the values if absent. If given, it applies to the surface too. If absent, the surface
-            has the default of `Cloud.normals`.
-        mean : str, optional
-            Mean of the functions through the values: `"zero"` (if absent), `"constant"`, or `"linear"` in the
-            coordinates. With a constant the matrix maps constants exactly to 0.
-        noise_variances : array_like, `[n]`, optional
-            The noise variance at each point, V², instead of `alpha`.
-        solver : str, optional
-            `"dense"`, or `"auto"` (if absent) to let the service choose.
-        duplicates : str, optional
-            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
 
         Returns
         -------
@@ -155,58 +84,21 @@ class OperatorsOnCloud(RegisteredCloud):
         >>> answer.matrices.shape, (answer.matrices @ np.cos(angles)).round(3).T
         ((2, 1, 8), array([[ 0.36, -0.48]]))
         """
-        return self._compute(
-            SurfaceGradientMatrix.read,
-            "/v1/surface-gradient/matrix",
-            queries=queries,
-            geometry=geometry,
-            kernel=kernel,
-            alpha=alpha,
-            mean=mean,
-            noise_variances=noise_variances,
-            solver=solver,
-            duplicates=duplicates,
-        )
+        return self._compute(SurfaceGradientMatrix.read, "/v1/surface-gradient/matrix", queries=queries, **options)
 
     def surface_gradient_sparse_matrix(
-        self,
-        queries: npt.ArrayLike | None = None,
-        *,
-        geometry: GeometryLike | None = None,
-        kernel: KernelLike | None = None,
-        alpha: Number | None = None,
-        noise_variances: npt.ArrayLike | None = None,
-        solver: Solver | None = None,
-        duplicates: Duplicates | None = None,
-        sites: npt.ArrayLike | None = None,
+        self, queries: npt.ArrayLike | None = None, **options: Unpack[SurfaceOperatorFit]
     ) -> SurfaceGradientSparseMatrix:
         """Assembles sparse matrices, one per coordinate, that map values to surface gradients.
 
         The weights come from the points near each query, without a kernel for the values. `kernel` and
         `alpha` are those of the surface. Works for any number of points. Needs SciPy.
+        `gramian.SurfaceOperatorFit` describes the options.
 
         Parameters
         ----------
         queries : array_like, `[m, d]`, optional
             Positions on the surface, a row of coordinates each. The points of the surface's cloud if absent.
-        geometry : Geometry, dict, Cloud or Diagnostics, optional
-            The surface, if it is sampled by the points of another cloud.
-        kernel : str, dict or Kernel, optional
-            A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
-            dictionary), or the `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and
-            reported in `diagnostics`.
-        alpha : float, optional
-            Number added to the diagonal of the Gram matrix of the surface, as for `Cloud.normals`.
-        noise_variances : array_like, `[n]`, optional
-            The noise variance at each point, instead of `alpha`.
-        solver : str, optional
-            Solver for the fit of the surface: `"dense"`, `"local"` for regressions of the points near each
-            query, or `"auto"` (if absent) to let the service choose.
-        duplicates : str, optional
-            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
-        sites : array_like, `[s, d]`, optional
-            Positions at which the local solver learns noise and shape of the surface, at most 192 points of
-            the cloud. The solver chooses some if absent.
 
         Returns
         -------
@@ -231,36 +123,15 @@ class OperatorsOnCloud(RegisteredCloud):
         """
         require_scipy()
         return self._compute(
-            SurfaceGradientSparseMatrix.read,
-            "/v1/surface-gradient/sparse-matrix",
-            queries=queries,
-            geometry=geometry,
-            kernel=kernel,
-            alpha=alpha,
-            noise_variances=noise_variances,
-            solver=solver,
-            duplicates=duplicates,
-            sites=sites,
+            SurfaceGradientSparseMatrix.read, "/v1/surface-gradient/sparse-matrix", queries=queries, **options
         )
 
     def laplace_beltrami(
-        self,
-        values: npt.ArrayLike,
-        queries: npt.ArrayLike | None = None,
-        *,
-        geometry: GeometryLike | None = None,
-        include: Deviations | Iterable[Deviations] | None = None,
-        deviations: bool | None = None,
-        kernel: KernelLike | None = None,
-        alpha: Number | None = None,
-        mean: Mean | None = None,
-        noise_variances: npt.ArrayLike | None = None,
-        solver: Solver | None = None,
-        duplicates: Duplicates | None = None,
+        self, values: npt.ArrayLike, queries: npt.ArrayLike | None = None, **options: Unpack[OperatorOptions]
     ) -> LaplaceBeltrami:
         """Applies the Laplace–Beltrami operator to the function through values.
 
-        On the unit circle Δ cos θ = −cos θ.
+        On the unit circle Δ cos θ = −cos θ. `gramian.OperatorOptions` describes the options.
 
         Parameters
         ----------
@@ -268,31 +139,6 @@ class OperatorsOnCloud(RegisteredCloud):
             Values at the points, in their order, unit V.
         queries : array_like, `[m, d]`, optional
             Positions on the surface, a row of coordinates each. The points of the surface's cloud if absent.
-        geometry : Geometry, dict, Cloud or Diagnostics, optional
-            The surface, if it has another cloud or fit than the values.
-        include : str or several, optional
-            Additional results: `"deviations"`. Nothing if absent.
-        deviations : bool, optional
-            True for standard deviations, as by `include="deviations"`.
-        kernel : str, dict or Kernel, optional
-            A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
-            dictionary), or the `diagnostics.kernel` of an answer. If absent, learned from the values by their
-            likelihood, with its variance and the noise, and chosen from the cloud for the surface.
-            `diagnostics` reports it.
-        alpha : float, optional
-            Number added to the diagonal of the Gram matrix, V². 0 interpolates, the noise variance regresses.
-            If absent, 1e-10 where `kernel` is given, else learned from the values. If given, it applies to
-            the surface too. If absent, the surface has the default of `Cloud.normals`.
-        mean : str, optional
-            Mean of u, beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates. If absent,
-            a constant where `kernel` is absent too, else zero.
-        noise_variances : array_like, `[n]`, optional
-            The noise variance at each point, V², instead of `alpha`.
-        solver : str, optional
-            `"dense"`; `"local"` for weights of the points near each query, without `kernel` or `alpha` and
-            for any number of points; or `"auto"` (if absent) to let the service choose.
-        duplicates : str, optional
-            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
 
         Returns
         -------
@@ -308,58 +154,22 @@ class OperatorsOnCloud(RegisteredCloud):
         array([-0.8])
         """
         return self._compute(
-            LaplaceBeltrami.read,
-            "/v1/laplace-beltrami",
-            GEOMETRIC,
-            values=values,
-            queries=queries,
-            geometry=geometry,
-            include=with_deviations(include, deviations),
-            kernel=kernel,
-            alpha=alpha,
-            mean=mean,
-            noise_variances=noise_variances,
-            solver=solver,
-            duplicates=duplicates,
+            LaplaceBeltrami.read, "/v1/laplace-beltrami", GEOMETRIC, values=values, queries=queries, **options
         )
 
     def laplace_beltrami_matrix(
-        self,
-        queries: npt.ArrayLike | None = None,
-        *,
-        geometry: GeometryLike | None = None,
-        kernel: KernelLike | None = None,
-        alpha: Number | None = None,
-        mean: Mean | None = None,
-        noise_variances: npt.ArrayLike | None = None,
-        solver: Solver | None = None,
-        duplicates: Duplicates | None = None,
+        self, queries: npt.ArrayLike | None = None, **options: Unpack[OperatorFit]
     ) -> LaplaceBeltramiMatrix:
         """Assembles the matrix that turns values at the points into Δu at the queries.
+
+        There are no values to learn from. If absent, `kernel` is chosen from the cloud, `alpha` is 1e-10 and
+        `mean` is zero. With a constant mean the matrix maps constants exactly to 0. The solver is dense.
+        `gramian.OperatorFit` describes the options.
 
         Parameters
         ----------
         queries : array_like, `[m, d]`, optional
             Positions on the surface, a row of coordinates each. The points of the surface's cloud if absent.
-        geometry : Geometry, dict, Cloud or Diagnostics, optional
-            The surface, if it has another cloud or fit than the values.
-        kernel : str, dict or Kernel, optional
-            A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
-            dictionary), or the `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and
-            reported in `diagnostics`.
-        alpha : float, optional
-            Number added to the diagonal of the Gram matrix, V². 0 interpolates, the noise variance regresses.
-            1e-10 for the values if absent. If given, it applies to the surface too. If absent, the surface
-            has the default of `Cloud.normals`.
-        mean : str, optional
-            Mean of the functions through the values: `"zero"` (if absent), `"constant"`, or `"linear"` in the
-            coordinates. With a constant the matrix maps constants exactly to 0.
-        noise_variances : array_like, `[n]`, optional
-            The noise variance at each point, V², instead of `alpha`.
-        solver : str, optional
-            `"dense"`, or `"auto"` (if absent) to let the service choose.
-        duplicates : str, optional
-            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
 
         Returns
         -------
@@ -375,58 +185,21 @@ class OperatorsOnCloud(RegisteredCloud):
         >>> answer.matrix.shape, (answer.matrix @ np.cos(angles)).round(3)[0]
         ((8, 8), np.float64(-1.0))
         """
-        return self._compute(
-            LaplaceBeltramiMatrix.read,
-            "/v1/laplace-beltrami/matrix",
-            queries=queries,
-            geometry=geometry,
-            kernel=kernel,
-            alpha=alpha,
-            mean=mean,
-            noise_variances=noise_variances,
-            solver=solver,
-            duplicates=duplicates,
-        )
+        return self._compute(LaplaceBeltramiMatrix.read, "/v1/laplace-beltrami/matrix", queries=queries, **options)
 
     def laplace_beltrami_sparse_matrix(
-        self,
-        queries: npt.ArrayLike | None = None,
-        *,
-        geometry: GeometryLike | None = None,
-        kernel: KernelLike | None = None,
-        alpha: Number | None = None,
-        noise_variances: npt.ArrayLike | None = None,
-        solver: Solver | None = None,
-        duplicates: Duplicates | None = None,
-        sites: npt.ArrayLike | None = None,
+        self, queries: npt.ArrayLike | None = None, **options: Unpack[SurfaceOperatorFit]
     ) -> LaplaceBeltramiSparseMatrix:
         """Assembles the sparse matrix that turns values at the points into Δu at the queries.
 
         The weights come from the points near each query, without a kernel for the values. `kernel` and
         `alpha` are those of the surface. Works for any number of points. Needs SciPy.
+        `gramian.SurfaceOperatorFit` describes the options.
 
         Parameters
         ----------
         queries : array_like, `[m, d]`, optional
             Positions on the surface, a row of coordinates each. The points of the surface's cloud if absent.
-        geometry : Geometry, dict, Cloud or Diagnostics, optional
-            The surface, if it is sampled by the points of another cloud.
-        kernel : str, dict or Kernel, optional
-            A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
-            dictionary), or the `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and
-            reported in `diagnostics`.
-        alpha : float, optional
-            Number added to the diagonal of the Gram matrix of the surface, as for `Cloud.normals`.
-        noise_variances : array_like, `[n]`, optional
-            The noise variance at each point, instead of `alpha`.
-        solver : str, optional
-            Solver for the fit of the surface: `"dense"`, `"local"` for regressions of the points near each
-            query, or `"auto"` (if absent) to let the service choose.
-        duplicates : str, optional
-            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
-        sites : array_like, `[s, d]`, optional
-            Positions at which the local solver learns noise and shape of the surface, at most 192 points of
-            the cloud. The solver chooses some if absent.
 
         Returns
         -------
@@ -449,14 +222,5 @@ class OperatorsOnCloud(RegisteredCloud):
         """
         require_scipy()
         return self._compute(
-            LaplaceBeltramiSparseMatrix.read,
-            "/v1/laplace-beltrami/sparse-matrix",
-            queries=queries,
-            geometry=geometry,
-            kernel=kernel,
-            alpha=alpha,
-            noise_variances=noise_variances,
-            solver=solver,
-            duplicates=duplicates,
-            sites=sites,
+            LaplaceBeltramiSparseMatrix.read, "/v1/laplace-beltrami/sparse-matrix", queries=queries, **options
         )

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Literal, Required, TypeAlias, TypedDict
+from typing import Literal, Required, TypeAlias, TypedDict, Unpack
 
 import numpy.typing as npt
 
 from ..answers import ModelSelection
-from ..arguments.fit import Duplicates, Family, KernelLike, Mean, Number, Solver, Whole
+from ..arguments.fit import Family, Number, ValuesFit, Whole
 from ..arguments.keywords import suggest_names
 from ..arguments.registration import RegisteredCloud
 from ..rest.models import FreeParameter, SelectionCriterion, SelectionParameter
@@ -84,17 +84,13 @@ class SelectionOnCloud(RegisteredCloud):
         families: Family | Iterable[Family] | None = None,
         restarts: Whole | None = None,
         seed: Whole | None = None,
-        kernel: KernelLike | None = None,
-        alpha: Number | None = None,
-        mean: Mean | None = None,
-        noise_variances: npt.ArrayLike | None = None,
-        solver: Solver | None = None,
-        duplicates: Duplicates | None = None,
+        **options: Unpack[ValuesFit],
     ) -> ModelSelection:
         """Searches for the kernel and the noise that explain values best.
 
         The search begins with `kernel` and `alpha`, and again from other starts within the bounds. It follows
-        the slopes of the criterion.
+        the slopes of the criterion. With `noise_variances`, alpha is not searched. The solver is dense, and
+        points are not merged. `gramian.ValuesFit` describes the options of the fit.
 
         Parameters
         ----------
@@ -118,23 +114,6 @@ class SelectionOnCloud(RegisteredCloud):
             Number of further starts for each family, at most 100. 2 if absent.
         seed : int, optional
             Seed of the further starts. 0 if absent.
-        kernel : str, dict or Kernel, optional
-            Start of the search: a family (`"gauss"`), one with parameters
-            (`gramian.Kernel("gauss", length_scale=2)` or a dictionary), or the `diagnostics.kernel` of an
-            answer. If absent, learned from the values by their likelihood, with its variance and the noise.
-        alpha : float, optional
-            Noise variance at the start of the search, V². If absent, 1e-10 where `kernel` is given, else
-            learned from the values.
-        mean : str, optional
-            Mean of the function, beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates.
-            If absent, a constant where `kernel` is absent too, else zero.
-        noise_variances : array_like, `[n]`, optional
-            The noise variance at each point, V², instead of `alpha`, which is then not searched.
-        solver : str, optional
-            `"dense"` or `"auto"`, which mean the same here. `"auto"` if absent.
-        duplicates : str, optional
-            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent). They are not merged
-            here.
 
         Returns
         -------
@@ -164,10 +143,5 @@ class SelectionOnCloud(RegisteredCloud):
             families=families,
             restarts=restarts,
             seed=seed,
-            kernel=kernel,
-            alpha=alpha,
-            mean=mean,
-            noise_variances=noise_variances,
-            solver=solver,
-            duplicates=duplicates,
+            **options,
         )

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from typing import Unpack
 
 import numpy.typing as npt
 
 from ..answers import Curvatures, Normals
-from ..arguments.fit import Deviations, Duplicates, KernelLike, Number, Orientation, Solver, Surface
 from ..arguments.keywords import suggest_names
-from ..arguments.normalise import GEOMETRIC, with_deviations
+from ..arguments.normalise import GEOMETRIC
+from ..arguments.options import SurfaceOptions
 from ..arguments.registration import RegisteredCloud
 
 
@@ -21,46 +21,17 @@ class SurfaceOfCloud(RegisteredCloud):
         self,
         queries: npt.ArrayLike | None = None,
         *,
-        surface: Surface | None = None,
-        orientation: Orientation | None = None,
-        include: Deviations | Iterable[Deviations] | None = None,
-        deviations: bool | None = None,
-        kernel: KernelLike | None = None,
-        alpha: Number | None = None,
-        noise_variances: npt.ArrayLike | None = None,
-        solver: Solver | None = None,
-        duplicates: Duplicates | None = None,
         sites: npt.ArrayLike | None = None,
+        **options: Unpack[SurfaceOptions],
     ) -> Normals:
         """Computes unit normals ν = −∇u/|∇u| of the surface that the points sample. No mesh is needed.
+
+        `gramian.SurfaceOptions` describes further options.
 
         Parameters
         ----------
         queries : array_like, `[m, d]`, optional
             Positions at which to compute normals, a row of coordinates each. The points if absent.
-        surface : str, optional
-            `"signature"`, `"offset"` or `"local"` to allow only that function. `"auto"` if absent.
-        orientation : str, optional
-            `"outward"` (if absent), or `"gradient"` for the side given by the gradient of u.
-        include : str or several, optional
-            Additional results: `"deviations"`. Nothing if absent.
-        deviations : bool, optional
-            True for standard deviations, as by `include="deviations"`. They come from local regressions,
-            unless `kernel`, `alpha`, `surface` or `solver` say otherwise.
-        kernel : str, dict or Kernel, optional
-            A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
-            dictionary), or the `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and
-            reported in `diagnostics`.
-        alpha : float, optional
-            Number added to the diagonal of the Gram matrix, without unit. If absent, 1e-10 where `kernel` is
-            given, else chosen by the noise of the points, at least 1e-3.
-        noise_variances : array_like, `[n]`, optional
-            The noise variance at each point, instead of `alpha`.
-        solver : str, optional
-            `"dense"`; `"local"` for regressions of the points near each query, without `kernel` or `alpha`
-            and for any number of points; or `"auto"` (if absent) to let the service choose.
-        duplicates : str, optional
-            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
         sites : array_like, `[s, d]`, optional
             Positions at which the local solver learns noise and shape of the surface, at most 192 points of
             the cloud. The solver chooses some if absent.
@@ -82,71 +53,18 @@ class SurfaceOfCloud(RegisteredCloud):
         >>> [(entry.query, entry.reason.value) for entry in answer.degenerate]
         [(1, 'vanishing_gradient')]
         """
-        return self._compute(
-            Normals.read,
-            "/v1/normals",
-            GEOMETRIC,
-            queries=queries,
-            surface=surface,
-            orientation=orientation,
-            include=with_deviations(include, deviations),
-            kernel=kernel,
-            alpha=alpha,
-            noise_variances=noise_variances,
-            solver=solver,
-            duplicates=duplicates,
-            sites=sites,
-        )
+        return self._compute(Normals.read, "/v1/normals", GEOMETRIC, queries=queries, sites=sites, **options)
 
-    def curvatures(
-        self,
-        queries: npt.ArrayLike | None = None,
-        *,
-        surface: Surface | None = None,
-        orientation: Orientation | None = None,
-        include: Deviations | Iterable[Deviations] | None = None,
-        deviations: bool | None = None,
-        kernel: KernelLike | None = None,
-        alpha: Number | None = None,
-        noise_variances: npt.ArrayLike | None = None,
-        solver: Solver | None = None,
-        duplicates: Duplicates | None = None,
-        sites: npt.ArrayLike | None = None,
-    ) -> Curvatures:
+    def curvatures(self, queries: npt.ArrayLike | None = None, **options: Unpack[SurfaceOptions]) -> Curvatures:
         """Computes principal, mean and Gaussian curvatures of the surface that the points sample.
 
         No mesh is needed. With outward normals a sphere of radius r has the curvatures +1/r.
+        `gramian.SurfaceOptions` describes the options.
 
         Parameters
         ----------
         queries : array_like, `[m, d]`, optional
             Positions at which to compute curvatures, a row of coordinates each. The points if absent.
-        surface : str, optional
-            `"signature"`, `"offset"` or `"local"` to allow only that function. `"auto"` if absent.
-        orientation : str, optional
-            `"outward"` (if absent), or `"gradient"` for the side given by the gradient of u.
-        include : str or several, optional
-            Additional results: `"deviations"`. Nothing if absent.
-        deviations : bool, optional
-            True for standard deviations, as by `include="deviations"`. They come from local regressions,
-            unless `kernel`, `alpha`, `surface` or `solver` say otherwise.
-        kernel : str, dict or Kernel, optional
-            A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
-            dictionary), or the `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and
-            reported in `diagnostics`.
-        alpha : float, optional
-            Number added to the diagonal of the Gram matrix, without unit. If absent, 1e-10 where `kernel` is
-            given, else chosen by the noise of the points, at least 1e-3.
-        noise_variances : array_like, `[n]`, optional
-            The noise variance at each point, instead of `alpha`.
-        solver : str, optional
-            `"dense"`; `"local"` for regressions of the points near each query, without `kernel` or `alpha`
-            and for any number of points; or `"auto"` (if absent) to let the service choose.
-        duplicates : str, optional
-            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
-        sites : array_like, `[s, d]`, optional
-            Positions at which the local solver learns noise and shape of the surface, at most 192 points of
-            the cloud. The solver chooses some if absent.
 
         Returns
         -------
@@ -170,18 +88,4 @@ class SurfaceOfCloud(RegisteredCloud):
         >>> answer.mean_curvatures.round(3), answer.mean_curvature_deviations.round(3)
         (array([0.202]), array([0.004]))
         """
-        return self._compute(
-            Curvatures.read,
-            "/v1/curvatures",
-            GEOMETRIC,
-            queries=queries,
-            surface=surface,
-            orientation=orientation,
-            include=with_deviations(include, deviations),
-            kernel=kernel,
-            alpha=alpha,
-            noise_variances=noise_variances,
-            solver=solver,
-            duplicates=duplicates,
-            sites=sites,
-        )
+        return self._compute(Curvatures.read, "/v1/curvatures", GEOMETRIC, queries=queries, **options)

@@ -19,7 +19,7 @@ import httpx
 import numpy as np
 import numpy.typing as npt
 
-from ..rest.models import Degenerate, Diagnostics
+from ..rest.models import Diagnostics
 
 save_safetensors: Callable[..., bytes] | None
 try:
@@ -100,35 +100,22 @@ class Members:
     request: Mapping[str, Any]
     """The request that was answered."""
 
+    def __contains__(self, name: object) -> bool:
+        return name in self.tensors or name in self.fields
+
+    def __getitem__(self, name: str) -> Any:  # noqa: ANN401 (a tensor, or JSON)
+        return self.tensors[name] if name in self.tensors else self.fields[name]
+
     @property
     def diagnostics(self) -> Diagnostics:
         """The diagnostics of the answer."""
         return Diagnostics.from_dict(self.fields["diagnostics"])
 
-    @property
-    def degenerate(self) -> tuple[Degenerate, ...]:
-        """The queries without a meaningful answer, or with a doubtful one."""
-        return tuple(Degenerate.from_dict(entry) for entry in self.fields["degenerate"])
-
-    def array(self, name: str, *entry: int) -> Array:
-        """Returns an array with entries of the shape `entry`, NaN where an entry is null."""
+    def array(self, name: str) -> Array:
+        """Returns an array, NaN where a number or a row is null."""
         if name in self.tensors:
             return self.tensors[name]
-        return _frozen(_filled(self.fields[name], entry))
-
-    def arrays(self, name: str, *entry: int) -> Array:
-        """Returns a list of arrays as one array, with entries of the shape `entry`, NaN for null."""
-        if name in self.tensors:
-            return self.tensors[name]
-        return _frozen(np.stack([_filled(rows, entry) for rows in self.fields[name]]))
-
-    def column(self, name: str, member: str) -> Array:
-        """Returns a member of each object in a list, NaN where it is null."""
-        return _frozen(_filled([entry.get(member) for entry in self.fields[name]], ()))
-
-    def within(self, name: str) -> Members:
-        """Returns the members of an object in the answer, which is JSON in every format."""
-        return Members({}, self.fields[name], self.request)
+        return _frozen(np.array(_filled(self.fields[name], np.full(self._row(name), np.nan)), dtype=np.float64))
 
     def integers(self, name: str) -> Integers:
         """Returns a list of whole numbers."""
@@ -136,13 +123,17 @@ class Members:
             return self.tensors[name]
         return _frozen(np.array(self.fields[name], dtype=np.int64))
 
-    def optional(self, name: str, *entry: int) -> Array | None:
-        """Returns an array, or None if the answer has no such member."""
-        return self.array(name, *entry) if name in self.tensors or name in self.fields else None
-
-    def optional_arrays(self, name: str, *entry: int) -> Array | None:
-        """Returns a stack of arrays, or None if the answer has no such member."""
-        return self.arrays(name, *entry) if name in self.tensors or name in self.fields else None
+    def _row(self, name: str) -> tuple[int, ...]:
+        """Returns the shape of what may be null in an array, since all of it may be."""
+        if name in ("matrix", "matrices"):
+            return (self.diagnostics.n_points,)
+        if name in ("normals", "gradients", "gradient_deviations"):
+            return (self.diagnostics.dimension,)
+        if name in ("principal_curvatures", "principal_curvature_deviations"):
+            return (self.diagnostics.dimension - 1,)
+        if name == "principal_directions":
+            return (self.diagnostics.dimension - 1, self.diagnostics.dimension)
+        return ()
 
 
 def decode(response: httpx.Response, request: Mapping[str, object]) -> Members:
@@ -165,13 +156,12 @@ def _view(body: bytes, start: int, tensor: Mapping[str, Any]) -> npt.NDArray[Any
     return numbers.reshape(shape)
 
 
-def _filled(rows: Sequence[Any], entry: tuple[int, ...]) -> Array:
-    """Returns the rows as an array. `entry` is the shape of a row, since all rows may be null."""
-    array = np.full((len(rows), *entry), np.nan)
-    present = [row for row, numbers in enumerate(rows) if numbers is not None]
-    if present:
-        array[present] = [rows[row] for row in present]
-    return array
+def _filled(rows: Sequence[Any], nothing: Array) -> list[Any]:
+    """Returns the rows with `nothing` instead of null, also in matrices."""
+    return [
+        nothing if row is None else _filled(row, nothing) if isinstance(row, list) and None in row else row
+        for row in rows
+    ]
 
 
 def _frozen(array: npt.NDArray[T]) -> npt.NDArray[T]:

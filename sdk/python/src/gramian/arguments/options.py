@@ -1,0 +1,118 @@
+"""Options that several methods take by name, each described once.
+
+A method takes them as `**options: Unpack[…]`, so that type checkers and editors know their names and types.
+`suggest_names` adds their descriptions to the docstring of the method, and their names to its signature.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any, TypedDict
+
+import numpy.typing as npt
+
+from .fit import Deviations, Fit, GeometryLike, Number, Orientation, Quantity, Surface, ValuesFit, Whole
+
+if TYPE_CHECKING:
+    from ..rest.models import Hyperparameters
+
+
+class SurfaceFit(Fit, total=False):
+    """Options for fitting a surface to the n points of a cloud, as keywords: `cloud.normals(**fit)`.
+
+    Keys
+    ----
+    hyperparameters : Hyperparameters or dict, optional
+        What local regressions have learned of the noise and the shape of the surface, as the
+        `diagnostics.hyperparameters` of an answer, possibly about another cloud. Learned from the cloud if
+        absent.
+    """
+
+    hyperparameters: Hyperparameters | Mapping[str, Any] | None
+
+
+class SurfaceOperatorFit(SurfaceFit, total=False):
+    """Options for a surface and an operator on it, without values.
+
+    Keys
+    ----
+    geometry : Geometry, dict, Cloud or Diagnostics, optional
+        The surface, if it has another cloud or fit than the values. Options absent from it are those given
+        here for the values, or else as `Cloud.normals` chooses them.
+    """
+
+    geometry: GeometryLike | None
+
+
+class OperatorFit(SurfaceOperatorFit, ValuesFit, total=False):
+    """Options for fitting a function and a surface, as keywords: `cloud.laplace_beltrami(values, **fit)`."""
+
+
+class DeviationOptions(TypedDict, total=False):
+    """Standard deviations beside other results.
+
+    Keys
+    ----
+    include : str or several, optional
+        Additional results: `"deviations"`. Nothing if absent.
+    deviations : bool, optional
+        True for standard deviations, as by `include="deviations"`. Those of normals and curvatures come from
+        local regressions, unless `kernel`, `alpha`, `surface` or `solver` say otherwise.
+    """
+
+    include: Deviations | Iterable[Deviations] | None
+    deviations: bool | None
+
+
+class InterpolationOptions(DeviationOptions, ValuesFit, total=False):
+    """Options of functions through values.
+
+    Keys
+    ----
+    derivatives : 0, 1 or 2, optional
+        1 for gradients, 2 for Hessians as well. 0 if absent.
+    """
+
+    derivatives: Whole | None
+
+
+class PosteriorOptions(ValuesFit, total=False):
+    """Options of Gaussian processes.
+
+    Keys
+    ----
+    include : str or several, optional
+        Additional results beside the means: `"variance"`, `"observation_variance"`, `"covariance"`,
+        `"gradients"`, `"gradient_variances"`, `"log_marginal_likelihood"`. Nothing if absent.
+    samples : int or dict, optional
+        Number of functions to draw from each posterior, jointly at all queries, or
+        `{"count": 10, "seed": 1}`.
+    quantiles : array_like, `[q]`, optional
+        Probabilities between 0 and 1 for which to return quantiles of the latent functions.
+    threshold : float, optional
+        Threshold of `exceedance_probabilities`, V: the probabilities that a new observation exceeds it.
+    """
+
+    include: Quantity | Iterable[Quantity] | None
+    samples: Whole | Mapping[str, Whole] | None
+    quantiles: npt.ArrayLike | None
+    threshold: Number | None
+
+
+class SurfaceOptions(DeviationOptions, SurfaceFit, total=False):
+    """Options of normals and curvatures.
+
+    Keys
+    ----
+    surface : str, optional
+        `"signature"`, `"offset"` or `"local"` to allow only that function. `"auto"` if absent.
+    orientation : str, optional
+        `"outward"` (if absent), or `"gradient"` for the side given by the gradient of u.
+    """
+
+    surface: Surface | None
+    orientation: Orientation | None
+
+
+class OperatorOptions(DeviationOptions, OperatorFit, total=False):
+    """Options of operators that are applied to values."""
