@@ -57,7 +57,7 @@ async fn hyperparameters_out_of_range_are_refused_by_their_place() {
         let problem = server.post("/v1/normals", &body).await.expect_problem(422, "invalid-request");
         assert_eq!(problem["errors"][0]["pointer"], format!("/hyperparameters/{member}"));
     }
-    for path in ["/v1/normals", "/v1/curvatures", "/v1/surface-gradient/sparse-matrix"] {
+    for path in ["/v1/normals", "/v1/curvatures"] {
         let body = json!({"cloud": cloud, "surface": "signature", "hyperparameters": known});
         let problem = server.post(path, &body).await.expect_problem(422, "unsupported-by-solver");
         assert_eq!(problem["errors"][0]["pointer"], "/hyperparameters", "{path}");
@@ -132,8 +132,9 @@ async fn tiles_that_cannot_be_are_refused_by_their_place() {
         let problem = server.post(path, &body).await.expect_problem(422, "invalid-request");
         assert_eq!(problem["errors"][0]["pointer"], pointer, "{path}");
     }
-    let body = json!({"cloud": cloud, "own": [], "solver": "dense"});
-    server.post("/v1/regions", &body).await.expect_problem(422, "unsupported-by-solver");
+    let body = json!({"cloud": cloud, "own": [], "alpha": 0.1});
+    let problem = server.post("/v1/regions", &body).await.expect_problem(422, "unsupported-by-solver");
+    assert_eq!(problem["errors"][0]["pointer"], "/alpha");
     let empty = server.post("/v1/regions", &json!({"cloud": cloud, "own": []})).await.expect_ok();
     assert_eq!((&empty["regions"], &empty["n_edges"]), (&json!([]), &json!(0)));
 }

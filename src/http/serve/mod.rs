@@ -14,3 +14,5 @@ pub mod planner;
 pub mod sampling;
 
 mod report;
+#[cfg(test)]
+mod tests;

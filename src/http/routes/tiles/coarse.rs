@@ -72,7 +72,7 @@ impl Direct for CoarseRequest {
     type Answer = CoarseResponse;
 
     fn price(&self) -> Price {
-        coarse_price(self.points.n_rows, self.points.coordinates.len() / self.points.n_rows.max(1))
+        coarse_price(self.points.n_rows, self.points.dimension)
     }
 
     fn compute(self, planner: &Planner<'_>, observer: &JobObserver) -> Result<CoarseResponse, Problem> {

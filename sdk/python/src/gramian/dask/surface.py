@@ -150,21 +150,14 @@ def joined(replicas: Replicas, tiles: list[Any], inner: list[Any], outer: list[A
     it sees.
     """
     firsts = np.cumsum([0, *[len(tile["regions"]) for tile in tiles]])
-    rows, hosts = _numbered(inner, firsts)
-    seen, guests = _numbered(outer, firsts)
-    order = np.argsort(rows)
-    places = np.searchsorted(rows, seen, sorter=order).clip(max=max(len(rows) - 1, 0))
-    found = order[places] if len(rows) else np.arange(0)
-    links = np.column_stack([hosts[found], guests])[rows[found] == seen] if len(rows) else np.empty((0, 2))
-    links = np.unique(links.astype(np.int64), axis=0)
-    signs, are_doubtful = replicas.ask(0, lambda client: choose_sides(client, tiles, links))
+    rows = np.concatenate([rows for rows, _ in (*inner, *outer)])
+    pairs = zip((*inner, *outer), (*firsts[:-1], *firsts[:-1]), strict=True)
+    numbers = np.concatenate([labels + first for (_, labels), first in pairs])
+    order = np.lexsort((numbers, rows))
+    is_same = np.diff(rows[order]) == 0
+    links = np.column_stack([numbers[order][:-1], numbers[order][1:]])[is_same]
+    signs, are_doubtful = replicas.ask(0, lambda client: choose_sides(client, tiles, np.unique(links, axis=0)))
     return [Sides(signs[first:last], are_doubtful[first:last]) for first, last in pairwise(firsts.tolist())]
-
-
-def _numbered(labels: Sequence[tuple[Ints, Ints]], firsts: Ints) -> tuple[Ints, Ints]:
-    """Returns all rows with their regions, counted on from one tile to the next."""
-    numbers = [of_tile + first for (_, of_tile), first in zip(labels, firsts[:-1], strict=True)]
-    return np.concatenate([rows for rows, _ in labels]), np.concatenate(numbers)
 
 
 @dataclass(frozen=True)
@@ -198,13 +191,9 @@ def _sides(replicas: Replicas, tiles: list[Any]) -> list[Any]:
     """Joins the regions of tiles. Only what they say of one another travels."""
     attribute, labelled = dask.delayed(getattr, pure=True), dask.delayed(SurfaceTile.labelled, pure=True)
     outer = [labelled(tile) for tile in tiles]
-    seen = dask.delayed(_rows_of, pure=True)(outer)
+    seen = dask.delayed(np.concatenate, pure=True)([of_tile[0] for of_tile in outer])
     inner = [labelled(tile, seen) for tile in tiles]
     regions = [attribute(tile, "regions") for tile in tiles]
     of_all = dask.delayed(joined, pure=True)(replicas, regions, inner, outer)
     of_cell = dask.delayed(getitem, pure=True)
     return [of_cell(of_all, cell) for cell in range(len(tiles))]
-
-
-def _rows_of(labelled: list[Any]) -> Ints:
-    return np.concatenate([rows for rows, _ in labelled])

@@ -105,11 +105,6 @@ class Tiles:
             Whether standard deviations are wanted.
         kernel, alpha, mean
             As for `gramian.Cloud.interpolate`.
-
-        Returns
-        -------
-        Interpolation
-            Dask arrays in the order of the queries.
         """
         own = aligned(values, self._points)
         fit = ValuesFit(solver="dense", kernel=kernel, alpha=alpha, mean=mean)
