@@ -10,7 +10,7 @@ use gramian_numerics::patches::PatchKernel;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::solver::trend::Mean;
 use gramian_numerics::sums::regularization::Regularization;
-use gramian_numerics::surface::local::{Hyperparameters, Learning};
+use gramian_numerics::surface::local::{Learning, SurfaceHyperparameters};
 
 /// Id of a cloud: a BLAKE3 hash, written as 64 hexadecimal digits.
 ///
@@ -170,8 +170,8 @@ fn update_with_regularization(hasher: &mut blake3::Hasher, regularization: &Regu
     }
 }
 
-fn update_with_hyperparameters(hasher: &mut blake3::Hasher, known: &Hyperparameters) {
-    let Hyperparameters { regression, radius, least_ratio } = known;
+fn update_with_hyperparameters(hasher: &mut blake3::Hasher, known: &SurfaceHyperparameters) {
+    let SurfaceHyperparameters { regression, radius, least_ratio } = known;
     hasher.update(&regression.points_per_mean.to_le_bytes());
     let PatchKernel { length_scale, variance } = regression.kernel;
     update_with_floats(hasher, &[regression.noise, length_scale, variance, *radius, *least_ratio]);

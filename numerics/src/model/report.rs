@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::solver::trend::Trend;
 use crate::solver::{Disagreement, Method, Solution, Solver};
 use crate::surface::Surface;
-use crate::surface::local::Hyperparameters;
+use crate::surface::local::SurfaceHyperparameters;
 
 /// Quality numbers of a model and of the function that it served. Absent where the solver has none.
 #[derive(Debug, Clone, Default)]
@@ -30,7 +30,7 @@ pub struct Report {
     /// Difference from answers by half of the neighbours, in deviations. `None` unless it is too large.
     pub unsettled: Option<f64>,
     /// What local regressions learned, or were given.
-    pub hyperparameters: Option<Hyperparameters>,
+    pub hyperparameters: Option<SurfaceHyperparameters>,
     /// Number of positions around a point on which answers of local regressions depend.
     pub reach: Option<usize>,
 }

@@ -2,7 +2,7 @@
 //! nearest points.
 //!
 //! The height is the sum of a quadric, the entailed height that its curvature implies beyond second order, a
-//! Gaussian process and noise (`regression`). Hyperparameters come from the likelihood pooled over a sample
+//! Gaussian process and noise (`regression`). PatchHyperparameters come from the likelihood pooled over a sample
 //! of neighbourhoods (`pooled`). The size of the neighbourhoods is chosen along with them and grows with the
 //! noise (`means`). The posterior gives normal and curvatures with their deviations (`estimate`). Everything
 //! is local: work and memory are linear in points and queries.
@@ -60,10 +60,10 @@ pub struct NoiseRatio {
     pub log_share: f64,
 }
 
-/// Hyperparameters that local regressions learn of a cloud. With them, a part of the cloud is regressed as
+/// PatchHyperparameters that local regressions learn of a cloud. With them, a part of the cloud is regressed as
 /// the whole is.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Hyperparameters {
+pub struct PatchHyperparameters {
     /// Most points per mean that a regression sees, 1 where it sees the points themselves.
     pub points_per_mean: usize,
     /// Mixture of noise ratios, at most [`MAX_MODELS`]. Empty where nothing can be regressed.
@@ -88,7 +88,7 @@ pub struct Patches {
     kernel: PatchKernel,
 }
 
-/// Hyperparameters of the covariance of the heights: medians over the sites.
+/// PatchHyperparameters of the covariance of the heights: medians over the sites.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PatchKernel {
     /// Length scale ℓ, unit L.
@@ -147,7 +147,7 @@ impl Patches {
     /// # Errors
     /// [`NumericsError::DimensionTooSmall`] for d = 1, [`NumericsError::Cancelled`].
     pub fn with(
-        hyperparameters: &Hyperparameters,
+        hyperparameters: &PatchHyperparameters,
         cloud: Arc<Cloud>,
         sampling: Arc<Sampling>,
         observer: &dyn Observer,
@@ -166,12 +166,12 @@ impl Patches {
     }
 
     /// Returns what was learned, or given.
-    pub fn hyperparameters(&self) -> Hyperparameters {
+    pub fn hyperparameters(&self) -> PatchHyperparameters {
         let ratios = |models: &[Weighted]| {
             let ratio = |of: &Weighted| NoiseRatio { ratio: of.model.noise, log_share: of.log_share };
             models.iter().map(ratio).collect()
         };
-        Hyperparameters {
+        PatchHyperparameters {
             points_per_mean: self.points_per_mean(),
             noise_ratios: ratios(&self.models),
             flat_noise_ratios: ratios(&self.stiff),
@@ -262,7 +262,7 @@ impl Patches {
         self.noise
     }
 
-    /// Hyperparameters of the covariance of the heights: medians over the sites.
+    /// PatchHyperparameters of the covariance of the heights: medians over the sites.
     pub fn kernel(&self) -> PatchKernel {
         self.kernel
     }

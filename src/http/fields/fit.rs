@@ -61,11 +61,12 @@ pub struct Fit {
 
 /// Declares a request. The fields of a fit and the request's own fields are members of the same object.
 ///
-/// `with` names the field that holds the [`Geometry`] of the surface, where the request has one.
+/// `with` names the field that holds the [`Geometry`] of the surface, where the request has one. `taking` adds
+/// the hyperparameters of a surface.
 macro_rules! request {
     (
         $(#[$meta:meta])*
-        pub struct $name:ident $(with $geometry:ident)? {
+        pub struct $name:ident $(with $geometry:ident)? $(taking $hyperparameters:ident)? {
             $($(#[$field_meta:meta])* pub $field:ident: $type:ty,)*
         }
     ) => {
@@ -96,6 +97,11 @@ macro_rules! request {
             /// The treatment of points that coincide when alpha is 0.
             pub duplicates: Option<$crate::http::fields::DuplicatePolicy>,
             $($(#[$field_meta])* pub $field: $type,)*
+            $(
+                /// What local regressions take instead of learning it: the hyperparameters of an answer about a
+                /// cloud that has the points of this surface.
+                pub $hyperparameters: Option<$crate::http::fields::Hyperparameters>,
+            )?
         }
 
         impl $crate::http::fields::HasCloud for $name {
@@ -120,7 +126,7 @@ macro_rules! request {
                     duplicates: self.duplicates.unwrap_or_default(),
                     mean: None,
                     sites: None,
-                    hyperparameters: None,
+                    hyperparameters: None$(.or(self.$hyperparameters.take()))?,
                 }
             }
         }

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::http::problem::Problem;
-use gramian_numerics::patches::{self, MAX_MODELS, PatchKernel};
-use gramian_numerics::surface::local;
+use gramian_numerics::patches::{self, MAX_MODELS, PatchHyperparameters, PatchKernel};
+use gramian_numerics::surface::local::SurfaceHyperparameters;
 
 /// What local regressions learned of a cloud.
 ///
@@ -55,8 +55,8 @@ pub struct NoiseRatio {
 
 impl Hyperparameters {
     /// Reports what a surface learned, or was given.
-    pub fn of(learned: &local::Hyperparameters) -> Self {
-        let local::Hyperparameters { regression, radius, least_ratio } = learned;
+    pub fn of(learned: &SurfaceHyperparameters) -> Self {
+        let SurfaceHyperparameters { regression, radius, least_ratio } = learned;
         let ratios = |of: &[patches::NoiseRatio]| {
             of.iter().map(|of| NoiseRatio { ratio: of.ratio, log_share: of.log_share }).collect()
         };
@@ -76,7 +76,7 @@ impl Hyperparameters {
     ///
     /// # Errors
     /// 422 with a pointer to the first member that is out of its range.
-    pub fn plan(&self) -> Result<local::Hyperparameters, Problem> {
+    pub fn plan(&self) -> Result<SurfaceHyperparameters, Problem> {
         let refuse = |member: &str, requirement: &str| {
             Err(Problem::invalid_request(format!("/hyperparameters/{member}"), requirement))
         };
@@ -96,7 +96,7 @@ impl Hyperparameters {
         if self.radius <= 0.0 {
             return refuse("radius", "must be more than 0");
         }
-        let regression = patches::Hyperparameters {
+        let regression = PatchHyperparameters {
             points_per_mean: self.points_per_mean,
             noise_ratios: ratios(&self.noise_ratios, "noise_ratios")?,
             flat_noise_ratios: ratios(&self.flat_noise_ratios, "flat_noise_ratios")?,
@@ -104,7 +104,7 @@ impl Hyperparameters {
             kernel: PatchKernel { length_scale: self.length_scale, variance: self.variance },
         };
         let least_ratio = self.least_ratio.unwrap_or(f64::INFINITY);
-        Ok(local::Hyperparameters { regression, radius: self.radius, least_ratio })
+        Ok(SurfaceHyperparameters { regression, radius: self.radius, least_ratio })
     }
 }
 

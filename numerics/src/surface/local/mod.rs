@@ -18,7 +18,7 @@ use crate::error::NumericsError;
 use crate::machine::heap::{arc_payload, block_bytes, vec_bytes};
 use crate::machine::vector::{dot, norm};
 use crate::observer::{Observer, Stage};
-use crate::patches::{self, CurvatureDeviations, PatchGeometry, Patches};
+use crate::patches::{CurvatureDeviations, PatchGeometry, PatchHyperparameters, Patches};
 use crate::points::cloud::Cloud;
 use crate::points::neighbourhoods::Neighbourhoods;
 use crate::points::neighbours::Neighbour;
@@ -34,12 +34,12 @@ const SAYS_SIGN: f64 = 0.2;
 /// among them seven tenths of the normals that are off by 30°.
 const UNCERTAIN_NORMAL: f64 = 0.3;
 
-/// Hyperparameters of a surface by local regressions, learned of the whole cloud.
+/// SurfaceHyperparameters of a surface by local regressions, learned of the whole cloud.
 ///
 /// A part of the cloud that is given them has the surface of the whole.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Hyperparameters {
-    pub regression: patches::Hyperparameters,
+pub struct SurfaceHyperparameters {
+    pub regression: PatchHyperparameters,
     /// Half the diagonal of the bounding box, unit L. Surfaces that bend less than this says count as flat.
     pub radius: f64,
     /// Least ratio of a curvature to its deviation at which the curvature counts as known. Infinite if none
@@ -53,7 +53,7 @@ pub enum Learning {
     /// Neighbourhoods of sites, `[s, d]`; see [`Patches::learned_at`].
     AtSites(Arc<Cloud>),
     /// Nothing is learned.
-    Known(Arc<Hyperparameters>),
+    Known(Arc<SurfaceHyperparameters>),
 }
 
 /// Optional knowledge of a surface beside its points.
@@ -157,9 +157,9 @@ impl LocalSurface {
     }
 
     /// Returns what the regressions learned, or were given.
-    pub fn hyperparameters(&self) -> Hyperparameters {
+    pub fn hyperparameters(&self) -> SurfaceHyperparameters {
         let (radius, least_ratio) = (self.radius, self.least_ratio);
-        Hyperparameters { regression: self.patches.hyperparameters(), radius, least_ratio }
+        SurfaceHyperparameters { regression: self.patches.hyperparameters(), radius, least_ratio }
     }
 
     /// Returns `|h|` of the heights h of the points above the surface, L.

@@ -3,8 +3,7 @@
 use super::common::{GeometryWork, geometry_request, plan_geometry};
 use crate::http::compute::JobObserver;
 use crate::http::fields::{
-    Degenerate, Diagnostics, Fit, GeometryInclude, Hyperparameters, OrientationChoice, SurfaceChoice,
-    SurfaceUsed, request,
+    Degenerate, Diagnostics, GeometryInclude, OrientationChoice, SurfaceChoice, SurfaceUsed, request,
 };
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
@@ -18,7 +17,7 @@ use gramian_numerics::kernel::defaults::Purpose;
 
 request! {
     /// A cloud that samples a hypersurface, and queries at which to compute its curvatures.
-    pub struct CurvaturesRequest {
+    pub struct CurvaturesRequest taking hyperparameters {
         /// The points to compute at, one row of coordinates each. Default: the points of the cloud.
         #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
@@ -28,9 +27,6 @@ request! {
         pub orientation: Option<OrientationChoice>,
         /// Optional parts of the answer. Default: none.
         pub include: Option<Vec<GeometryInclude>>,
-        /// What `"solver": "local"` takes instead of learning it: the hyperparameters of an answer about a
-        /// cloud that has these points.
-        pub hyperparameters: Option<Hyperparameters>,
     }
 }
 
@@ -93,7 +89,7 @@ impl Operation for CurvaturesRequest {
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<GeometryWork>, Problem> {
-        let fit = Fit { hyperparameters: self.hyperparameters.take(), ..self.take_fit() };
+        let fit = self.take_fit();
         let request = geometry_request(self.surface, self.orientation, true, self.include.as_deref());
         plan_geometry(planner, fit, self.queries, request, Purpose::Curvatures, |d| d * d + 2 * d + 5)
     }

@@ -8,9 +8,7 @@ use super::operator::{
     Applied, AppliedAnswer, AppliedWork, MatrixAnswer, MatrixWork, SparseAnswer, StencilWork,
 };
 use crate::http::compute::JobObserver;
-use crate::http::fields::{
-    Degenerate, Diagnostics, Fit, Geometry, Hyperparameters, MeanChoice, ValuesInclude, request,
-};
+use crate::http::fields::{Degenerate, Diagnostics, Fit, Geometry, MeanChoice, ValuesInclude, request};
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
@@ -27,7 +25,7 @@ const OPERATOR: Operator = Operator::LaplaceBeltrami;
 
 request! {
     /// Values on a surface, and queries at which to compute their Laplace–Beltrami operator.
-    pub struct LaplaceBeltramiRequest with geometry {
+    pub struct LaplaceBeltramiRequest with geometry taking hyperparameters {
         /// The values at the points of `cloud`, in their order.
         #[schema(min_items = 1)]
         pub values: Vec<f64>,
@@ -54,7 +52,7 @@ pub enum MatrixFormat {
 
 request! {
     /// A cloud of nodes on a surface, and queries for the rows of its Laplace–Beltrami matrix.
-    pub struct LaplaceBeltramiMatrixRequest with geometry {
+    pub struct LaplaceBeltramiMatrixRequest with geometry taking hyperparameters {
         /// The points to compute rows for, one row of the matrix each. Default: the points of the surface's
         /// cloud.
         #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
@@ -167,15 +165,12 @@ impl Operation for LaplaceBeltramiMatrixRequest {
 
 request! {
     /// A cloud of nodes on a surface, and queries for the rows of its sparse Laplace–Beltrami matrix.
-    pub struct LaplaceBeltramiSparseMatrixRequest with geometry {
+    pub struct LaplaceBeltramiSparseMatrixRequest with geometry taking hyperparameters {
         /// The points to compute rows for, one row of the matrix each. Default: the points of the surface.
         #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The surface, if it differs from that of the request.
         pub geometry: Option<Geometry>,
-        /// What `"solver": "local"` takes instead of learning it: the hyperparameters of an answer about a
-        /// cloud that has these points.
-        pub hyperparameters: Option<Hyperparameters>,
     }
 }
 
@@ -218,7 +213,7 @@ impl Operation for LaplaceBeltramiSparseMatrixRequest {
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<StencilWork>, Problem> {
-        let fit = Fit { hyperparameters: self.hyperparameters.take(), ..self.take_fit() };
+        let fit = self.take_fit();
         StencilWork::plan(planner, OPERATOR, fit, self.geometry, self.queries)
     }
 

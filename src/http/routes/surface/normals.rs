@@ -3,8 +3,7 @@
 use super::common::{GeometryWork, geometry_request, plan_geometry};
 use crate::http::compute::JobObserver;
 use crate::http::fields::{
-    Degenerate, Diagnostics, Fit, GeometryInclude, Hyperparameters, OrientationChoice, SurfaceChoice,
-    SurfaceUsed, request,
+    Degenerate, Diagnostics, Fit, GeometryInclude, OrientationChoice, SurfaceChoice, SurfaceUsed, request,
 };
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
@@ -19,7 +18,7 @@ use gramian_numerics::kernel::defaults::Purpose;
 
 request! {
     /// A cloud that samples a hypersurface, and queries at which to compute its normals.
-    pub struct NormalsRequest {
+    pub struct NormalsRequest taking hyperparameters {
         /// The points to compute at, one row of coordinates each. Default: the points of the cloud.
         #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
@@ -35,9 +34,6 @@ request! {
         #[serde(default, deserialize_with = "present_unless_empty")]
         #[schema(value_type = Option<Vec<Vec<f64>>>, max_items = 192)]
         pub sites: Option<Points>,
-        /// What `"solver": "local"` takes instead of learning it: the hyperparameters of an answer about a
-        /// cloud that has these points.
-        pub hyperparameters: Option<Hyperparameters>,
     }
 }
 
@@ -82,8 +78,7 @@ impl Operation for NormalsRequest {
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<GeometryWork>, Problem> {
-        let (sites, hyperparameters) = (self.sites.take(), self.hyperparameters.take());
-        let fit = Fit { sites, hyperparameters, ..self.take_fit() };
+        let fit = Fit { sites: self.sites.take(), ..self.take_fit() };
         let request = geometry_request(self.surface, self.orientation, false, self.include.as_deref());
         plan_geometry(planner, fit, self.queries, request, Purpose::Normals, |d| d + 3)
     }

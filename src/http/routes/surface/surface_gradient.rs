@@ -5,9 +5,7 @@ use super::operator::{
     Applied, AppliedAnswer, AppliedWork, MatrixAnswer, MatrixWork, SparseAnswer, StencilWork,
 };
 use crate::http::compute::JobObserver;
-use crate::http::fields::{
-    Degenerate, Diagnostics, Fit, Geometry, Hyperparameters, MeanChoice, ValuesInclude, request,
-};
+use crate::http::fields::{Degenerate, Diagnostics, Fit, Geometry, MeanChoice, ValuesInclude, request};
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
@@ -24,7 +22,7 @@ const OPERATOR: Operator = Operator::SurfaceGradient;
 
 request! {
     /// Values on a surface, and queries at which to compute their surface gradient.
-    pub struct SurfaceGradientRequest with geometry {
+    pub struct SurfaceGradientRequest with geometry taking hyperparameters {
         /// The values at the points of `cloud`, in their order.
         #[schema(min_items = 1)]
         pub values: Vec<f64>,
@@ -42,7 +40,7 @@ request! {
 
 request! {
     /// A cloud of nodes on a surface, and queries for the rows of its surface gradient matrices.
-    pub struct SurfaceGradientMatrixRequest with geometry {
+    pub struct SurfaceGradientMatrixRequest with geometry taking hyperparameters {
         /// The points to compute rows for, one row of each matrix. Default: the points of the surface's
         /// cloud.
         #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
@@ -155,15 +153,12 @@ impl Operation for SurfaceGradientMatrixRequest {
 
 request! {
     /// A cloud of nodes on a surface, and queries for the rows of its sparse surface gradient matrices.
-    pub struct SurfaceGradientSparseMatrixRequest with geometry {
+    pub struct SurfaceGradientSparseMatrixRequest with geometry taking hyperparameters {
         /// The points to compute rows for, one row of each matrix. Default: the points of the surface.
         #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The surface, if it differs from that of the request.
         pub geometry: Option<Geometry>,
-        /// What `"solver": "local"` takes instead of learning it: the hyperparameters of an answer about a
-        /// cloud that has these points.
-        pub hyperparameters: Option<Hyperparameters>,
     }
 }
 
@@ -200,7 +195,7 @@ impl Operation for SurfaceGradientSparseMatrixRequest {
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<StencilWork>, Problem> {
-        let fit = Fit { hyperparameters: self.hyperparameters.take(), ..self.take_fit() };
+        let fit = self.take_fit();
         StencilWork::plan(planner, OPERATOR, fit, self.geometry, self.queries)
     }
 

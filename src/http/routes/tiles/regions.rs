@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::fields::{Border, Region};
 use crate::http::compute::JobObserver;
-use crate::http::fields::{Diagnostics, Fit, Hyperparameters, request};
+use crate::http::fields::{Diagnostics, request};
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::http::routes::operation::operation;
@@ -25,9 +25,7 @@ request! {
     /// A tile: a part of a cloud with the points around it, regressed locally.
     ///
     /// The normals of its cloud are directions outward by the signature function of the coarse cloud.
-    pub struct RegionsRequest {
-        /// What the whole cloud learned. Default: what the tile learns.
-        pub hyperparameters: Option<Hyperparameters>,
+    pub struct RegionsRequest taking hyperparameters {
         /// The points that the tile answers for, by their positions in its cloud, ascending.
         pub own: Vec<usize>,
         /// The points that belong to the coarse cloud, likewise. Default: none.
@@ -72,7 +70,7 @@ impl Operation for RegionsRequest {
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<RegionsWork>, Problem> {
-        let fit = Fit { hyperparameters: self.hyperparameters.take(), ..self.take_fit() };
+        let fit = self.take_fit();
         let request = GeometryRequest {
             model: SurfaceModel::Local,
             checks_curvatures: false,

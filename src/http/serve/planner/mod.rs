@@ -305,7 +305,7 @@ impl<'a> Planner<'a> {
             || request.model == SurfaceModel::Local
             || solver == SolverChoice::Auto && is_beyond;
         let options = if is_local && !has_own_process {
-            FitOptions { solver, ..FitOptions::default() }
+            FitOptions { solver, hyperparameters: options.hyperparameters, ..FitOptions::default() }
         } else {
             options
         };

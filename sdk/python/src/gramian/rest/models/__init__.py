@@ -1,10 +1,13 @@
 """Contains all the data models used in inputs/outputs"""
 
+from .border import Border
 from .bounding_box import BoundingBox
 from .cloud import Cloud
 from .cloud_list import CloudList
 from .cloud_ref import CloudRef
 from .cloud_request import CloudRequest
+from .coarse_request import CoarseRequest
+from .coarse_response import CoarseResponse
 from .curvatures_request import CurvaturesRequest
 from .curvatures_response import CurvaturesResponse
 from .degenerate import Degenerate
@@ -20,6 +23,7 @@ from .free_parameter import FreeParameter
 from .geometry import Geometry
 from .geometry_include import GeometryInclude
 from .health import Health
+from .hyperparameters import Hyperparameters
 from .interpolation_batch_request import InterpolationBatchRequest
 from .interpolation_batch_response import InterpolationBatchResponse
 from .interpolation_request import InterpolationRequest
@@ -44,6 +48,7 @@ from .matrix_format import MatrixFormat
 from .mean_choice import MeanChoice
 from .model_selection_request import ModelSelectionRequest
 from .model_selection_response import ModelSelectionResponse
+from .noise_ratio import NoiseRatio
 from .normals_request import NormalsRequest
 from .normals_response import NormalsResponse
 from .operation_name import OperationName
@@ -55,9 +60,14 @@ from .posterior_quantity import PosteriorQuantity
 from .posterior_request import PosteriorRequest
 from .posterior_response import PosteriorResponse
 from .problem import Problem
+from .region import Region
+from .regions_request import RegionsRequest
+from .regions_response import RegionsResponse
 from .samples import Samples
 from .selection_criterion import SelectionCriterion
 from .selection_parameter import SelectionParameter
+from .sides_request import SidesRequest
+from .sides_response import SidesResponse
 from .smoothness import Smoothness
 from .solver_choice import SolverChoice
 from .solver_used import SolverUsed
@@ -71,17 +81,21 @@ from .surface_gradient_response import SurfaceGradientResponse
 from .surface_gradient_sparse_matrix_request import SurfaceGradientSparseMatrixRequest
 from .surface_gradient_sparse_matrix_response import SurfaceGradientSparseMatrixResponse
 from .surface_used import SurfaceUsed
+from .tile_regions import TileRegions
 from .values_include import ValuesInclude
 from .version import Version
 from .warning import Warning_
 from .warning_code import WarningCode
 
 __all__ = (
+    "Border",
     "BoundingBox",
     "Cloud",
     "CloudList",
     "CloudRef",
     "CloudRequest",
+    "CoarseRequest",
+    "CoarseResponse",
     "CurvaturesRequest",
     "CurvaturesResponse",
     "Degenerate",
@@ -97,6 +111,7 @@ __all__ = (
     "Geometry",
     "GeometryInclude",
     "Health",
+    "Hyperparameters",
     "InterpolationBatchRequest",
     "InterpolationBatchResponse",
     "InterpolationRequest",
@@ -121,6 +136,7 @@ __all__ = (
     "MeanChoice",
     "ModelSelectionRequest",
     "ModelSelectionResponse",
+    "NoiseRatio",
     "NormalsRequest",
     "NormalsResponse",
     "OperationName",
@@ -132,9 +148,14 @@ __all__ = (
     "PosteriorRequest",
     "PosteriorResponse",
     "Problem",
+    "Region",
+    "RegionsRequest",
+    "RegionsResponse",
     "Samples",
     "SelectionCriterion",
     "SelectionParameter",
+    "SidesRequest",
+    "SidesResponse",
     "Smoothness",
     "SolverChoice",
     "SolverUsed",
@@ -148,6 +169,7 @@ __all__ = (
     "SurfaceGradientSparseMatrixRequest",
     "SurfaceGradientSparseMatrixResponse",
     "SurfaceUsed",
+    "TileRegions",
     "ValuesInclude",
     "Version",
     "WarningCode",

@@ -14,6 +14,7 @@ from ..types import UNSET, Unset, without_unset
 
 if TYPE_CHECKING:
     from ..models.cloud_ref import CloudRef
+    from ..models.hyperparameters import Hyperparameters
     from ..models.kernel import Kernel
 
 
@@ -46,11 +47,9 @@ class CurvaturesRequest:
         surface (SurfaceChoice | Unset): The function whose level set is the surface.
         orientation (OrientationChoice | Unset): The direction of normals.
         include (list[GeometryInclude] | Unset): Optional parts of the answer. Default: none.
-        sites (list[list[float]] | Unset): At most 192 points of the cloud, where `"solver": "local"` learns noise and
-            shape of the surface.
+        hyperparameters (Hyperparameters | Unset): What local regressions learned of a cloud.
 
-            Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
-            the same sites and the points around them.
+            Sent as `hyperparameters` of a request about a part of the cloud, they are used as they are.
     """
 
     cloud: CloudRef
@@ -63,7 +62,7 @@ class CurvaturesRequest:
     surface: SurfaceChoice | Unset = UNSET
     orientation: OrientationChoice | Unset = UNSET
     include: list[GeometryInclude] | Unset = UNSET
-    sites: list[list[float]] | Unset = UNSET
+    hyperparameters: Hyperparameters | Unset = UNSET
 
     __repr__ = without_unset
 
@@ -111,13 +110,9 @@ class CurvaturesRequest:
                 include_item = include_item_data.value
                 include.append(include_item)
 
-        sites: list[list[float]] | Unset = UNSET
-        if not isinstance(self.sites, Unset):
-            sites = []
-            for sites_item_data in self.sites:
-                sites_item = sites_item_data
-
-                sites.append(sites_item)
+        hyperparameters: dict[str, Any] | Unset = UNSET
+        if not isinstance(self.hyperparameters, Unset):
+            hyperparameters = self.hyperparameters.to_dict()
 
         field_dict: dict[str, Any] = {}
 
@@ -144,14 +139,15 @@ class CurvaturesRequest:
             field_dict["orientation"] = orientation
         if include is not UNSET:
             field_dict["include"] = include
-        if sites is not UNSET:
-            field_dict["sites"] = sites
+        if hyperparameters is not UNSET:
+            field_dict["hyperparameters"] = hyperparameters
 
         return field_dict
 
     @classmethod
     def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
         from ..models.cloud_ref import CloudRef
+        from ..models.hyperparameters import Hyperparameters
         from ..models.kernel import Kernel
 
         d = dict(src_dict)
@@ -214,14 +210,12 @@ class CurvaturesRequest:
 
                 include.append(include_item)
 
-        _sites = d.pop("sites", UNSET)
-        sites: list[list[float]] | Unset = UNSET
-        if _sites is not UNSET:
-            sites = []
-            for sites_item_data in _sites:
-                sites_item = cast(list[float], sites_item_data)
-
-                sites.append(sites_item)
+        _hyperparameters = d.pop("hyperparameters", UNSET)
+        hyperparameters: Hyperparameters | Unset
+        if isinstance(_hyperparameters, Unset):
+            hyperparameters = UNSET
+        else:
+            hyperparameters = Hyperparameters.from_dict(_hyperparameters)
 
         curvatures_request = cls(
             cloud=cloud,
@@ -234,7 +228,7 @@ class CurvaturesRequest:
             surface=surface,
             orientation=orientation,
             include=include,
-            sites=sites,
+            hyperparameters=hyperparameters,
         )
 
         return curvatures_request

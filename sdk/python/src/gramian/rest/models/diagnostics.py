@@ -11,6 +11,7 @@ from ..models.solver_used import SolverUsed
 from ..types import UNSET, Unset, without_unset
 
 if TYPE_CHECKING:
+    from ..models.hyperparameters import Hyperparameters
     from ..models.kernel_used import KernelUsed
     from ..models.stencils_used import StencilsUsed
     from ..models.warning import Warning_
@@ -55,6 +56,11 @@ class Diagnostics:
             Absent for values from the local solver, which is not evaluated at the points.
         noise_deviation (float | Unset): Estimated standard deviation of the noise of the points across the surface,
             length.
+        hyperparameters (Hyperparameters | Unset): What local regressions learned of a cloud.
+
+            Sent as `hyperparameters` of a request about a part of the cloud, they are used as they are.
+        reach (int | Unset): Number of positions around a point on which the answer there depends, with local
+            regressions.
         stencils (StencilsUsed | Unset): Number of rows of a sparse operator by how their weights were computed.
         geometry (Diagnostics | Unset): Diagnostics of an answer: the numbers used, the method, and its accuracy.
     """
@@ -77,6 +83,8 @@ class Diagnostics:
     mean_coefficients: list[float] | Unset = UNSET
     misfit: float | Unset = UNSET
     noise_deviation: float | Unset = UNSET
+    hyperparameters: Hyperparameters | Unset = UNSET
+    reach: int | Unset = UNSET
     stencils: StencilsUsed | Unset = UNSET
     geometry: Diagnostics | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
@@ -125,6 +133,12 @@ class Diagnostics:
 
         noise_deviation = self.noise_deviation
 
+        hyperparameters: dict[str, Any] | Unset = UNSET
+        if not isinstance(self.hyperparameters, Unset):
+            hyperparameters = self.hyperparameters.to_dict()
+
+        reach = self.reach
+
         stencils: dict[str, Any] | Unset = UNSET
         if not isinstance(self.stencils, Unset):
             stencils = self.stencils.to_dict()
@@ -166,6 +180,10 @@ class Diagnostics:
             field_dict["misfit"] = misfit
         if noise_deviation is not UNSET:
             field_dict["noise_deviation"] = noise_deviation
+        if hyperparameters is not UNSET:
+            field_dict["hyperparameters"] = hyperparameters
+        if reach is not UNSET:
+            field_dict["reach"] = reach
         if stencils is not UNSET:
             field_dict["stencils"] = stencils
         if geometry is not UNSET:
@@ -175,6 +193,7 @@ class Diagnostics:
 
     @classmethod
     def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
+        from ..models.hyperparameters import Hyperparameters
         from ..models.kernel_used import KernelUsed
         from ..models.stencils_used import StencilsUsed
         from ..models.warning import Warning_
@@ -221,6 +240,15 @@ class Diagnostics:
 
         noise_deviation = d.pop("noise_deviation", UNSET)
 
+        _hyperparameters = d.pop("hyperparameters", UNSET)
+        hyperparameters: Hyperparameters | Unset
+        if isinstance(_hyperparameters, Unset):
+            hyperparameters = UNSET
+        else:
+            hyperparameters = Hyperparameters.from_dict(_hyperparameters)
+
+        reach = d.pop("reach", UNSET)
+
         _stencils = d.pop("stencils", UNSET)
         stencils: StencilsUsed | Unset
         if isinstance(_stencils, Unset):
@@ -254,6 +282,8 @@ class Diagnostics:
             mean_coefficients=mean_coefficients,
             misfit=misfit,
             noise_deviation=noise_deviation,
+            hyperparameters=hyperparameters,
+            reach=reach,
             stencils=stencils,
             geometry=geometry,
         )

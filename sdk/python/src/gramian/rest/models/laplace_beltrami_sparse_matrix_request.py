@@ -12,6 +12,7 @@ from ..types import UNSET, Unset, without_unset
 if TYPE_CHECKING:
     from ..models.cloud_ref import CloudRef
     from ..models.geometry import Geometry
+    from ..models.hyperparameters import Hyperparameters
     from ..models.kernel import Kernel
 
 
@@ -44,11 +45,9 @@ class LaplaceBeltramiSparseMatrixRequest:
         geometry (Geometry | Unset): The surface of an operator, if it differs from the surface of the request.
 
             It may come from another cloud, kernel or alpha than the values. Absent fields are taken from the request.
-        sites (list[list[float]] | Unset): At most 192 points of the cloud, where `"solver": "local"` learns noise and
-            shape of the surface.
+        hyperparameters (Hyperparameters | Unset): What local regressions learned of a cloud.
 
-            Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
-            the same sites and the points around them.
+            Sent as `hyperparameters` of a request about a part of the cloud, they are used as they are.
     """
 
     cloud: CloudRef
@@ -59,7 +58,7 @@ class LaplaceBeltramiSparseMatrixRequest:
     duplicates: DuplicatePolicy | Unset = UNSET
     queries: list[list[float]] | Unset = UNSET
     geometry: Geometry | Unset = UNSET
-    sites: list[list[float]] | Unset = UNSET
+    hyperparameters: Hyperparameters | Unset = UNSET
 
     __repr__ = without_unset
 
@@ -96,13 +95,9 @@ class LaplaceBeltramiSparseMatrixRequest:
         if not isinstance(self.geometry, Unset):
             geometry = self.geometry.to_dict()
 
-        sites: list[list[float]] | Unset = UNSET
-        if not isinstance(self.sites, Unset):
-            sites = []
-            for sites_item_data in self.sites:
-                sites_item = sites_item_data
-
-                sites.append(sites_item)
+        hyperparameters: dict[str, Any] | Unset = UNSET
+        if not isinstance(self.hyperparameters, Unset):
+            hyperparameters = self.hyperparameters.to_dict()
 
         field_dict: dict[str, Any] = {}
 
@@ -125,8 +120,8 @@ class LaplaceBeltramiSparseMatrixRequest:
             field_dict["queries"] = queries
         if geometry is not UNSET:
             field_dict["geometry"] = geometry
-        if sites is not UNSET:
-            field_dict["sites"] = sites
+        if hyperparameters is not UNSET:
+            field_dict["hyperparameters"] = hyperparameters
 
         return field_dict
 
@@ -134,6 +129,7 @@ class LaplaceBeltramiSparseMatrixRequest:
     def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
         from ..models.cloud_ref import CloudRef
         from ..models.geometry import Geometry
+        from ..models.hyperparameters import Hyperparameters
         from ..models.kernel import Kernel
 
         d = dict(src_dict)
@@ -180,14 +176,12 @@ class LaplaceBeltramiSparseMatrixRequest:
         else:
             geometry = Geometry.from_dict(_geometry)
 
-        _sites = d.pop("sites", UNSET)
-        sites: list[list[float]] | Unset = UNSET
-        if _sites is not UNSET:
-            sites = []
-            for sites_item_data in _sites:
-                sites_item = cast(list[float], sites_item_data)
-
-                sites.append(sites_item)
+        _hyperparameters = d.pop("hyperparameters", UNSET)
+        hyperparameters: Hyperparameters | Unset
+        if isinstance(_hyperparameters, Unset):
+            hyperparameters = UNSET
+        else:
+            hyperparameters = Hyperparameters.from_dict(_hyperparameters)
 
         laplace_beltrami_sparse_matrix_request = cls(
             cloud=cloud,
@@ -198,7 +192,7 @@ class LaplaceBeltramiSparseMatrixRequest:
             duplicates=duplicates,
             queries=queries,
             geometry=geometry,
-            sites=sites,
+            hyperparameters=hyperparameters,
         )
 
         return laplace_beltrami_sparse_matrix_request

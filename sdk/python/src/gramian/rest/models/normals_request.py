@@ -14,6 +14,7 @@ from ..types import UNSET, Unset, without_unset
 
 if TYPE_CHECKING:
     from ..models.cloud_ref import CloudRef
+    from ..models.hyperparameters import Hyperparameters
     from ..models.kernel import Kernel
 
 
@@ -49,8 +50,10 @@ class NormalsRequest:
         sites (list[list[float]] | Unset): At most 192 points of the cloud, where `"solver": "local"` learns noise and
             shape of the surface.
 
-            Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
-            the same sites and the points around them.
+            Default: 96 to 191 points that the solver chooses.
+        hyperparameters (Hyperparameters | Unset): What local regressions learned of a cloud.
+
+            Sent as `hyperparameters` of a request about a part of the cloud, they are used as they are.
     """
 
     cloud: CloudRef
@@ -64,6 +67,7 @@ class NormalsRequest:
     orientation: OrientationChoice | Unset = UNSET
     include: list[GeometryInclude] | Unset = UNSET
     sites: list[list[float]] | Unset = UNSET
+    hyperparameters: Hyperparameters | Unset = UNSET
 
     __repr__ = without_unset
 
@@ -119,6 +123,10 @@ class NormalsRequest:
 
                 sites.append(sites_item)
 
+        hyperparameters: dict[str, Any] | Unset = UNSET
+        if not isinstance(self.hyperparameters, Unset):
+            hyperparameters = self.hyperparameters.to_dict()
+
         field_dict: dict[str, Any] = {}
 
         field_dict.update(
@@ -146,12 +154,15 @@ class NormalsRequest:
             field_dict["include"] = include
         if sites is not UNSET:
             field_dict["sites"] = sites
+        if hyperparameters is not UNSET:
+            field_dict["hyperparameters"] = hyperparameters
 
         return field_dict
 
     @classmethod
     def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
         from ..models.cloud_ref import CloudRef
+        from ..models.hyperparameters import Hyperparameters
         from ..models.kernel import Kernel
 
         d = dict(src_dict)
@@ -223,6 +234,13 @@ class NormalsRequest:
 
                 sites.append(sites_item)
 
+        _hyperparameters = d.pop("hyperparameters", UNSET)
+        hyperparameters: Hyperparameters | Unset
+        if isinstance(_hyperparameters, Unset):
+            hyperparameters = UNSET
+        else:
+            hyperparameters = Hyperparameters.from_dict(_hyperparameters)
+
         normals_request = cls(
             cloud=cloud,
             kernel=kernel,
@@ -235,6 +253,7 @@ class NormalsRequest:
             orientation=orientation,
             include=include,
             sites=sites,
+            hyperparameters=hyperparameters,
         )
 
         return normals_request

@@ -13,6 +13,7 @@ class OperationName(StrEnum):
     COMPUTE_NORMALS = "compute_normals"
     COMPUTE_POSTERIOR = "compute_posterior"
     COMPUTE_POSTERIOR_BATCH = "compute_posterior_batch"
+    COMPUTE_REGIONS = "compute_regions"
     COMPUTE_SURFACE_GRADIENT = "compute_surface_gradient"
     SELECT_MODEL = "select_model"
 

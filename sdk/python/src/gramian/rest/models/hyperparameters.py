@@ -1,0 +1,133 @@
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Self, TypeVar
+
+from attrs import define as _attrs_define
+
+from ..types import UNSET, Unset, without_unset
+
+if TYPE_CHECKING:
+    from ..models.noise_ratio import NoiseRatio
+
+
+T = TypeVar("T", bound="Hyperparameters")
+
+
+@_attrs_define
+class Hyperparameters:
+    """What local regressions learned of a cloud.
+
+    Sent as `hyperparameters` of a request about a part of the cloud, they are used as they are.
+
+        Attributes:
+            points_per_mean (int): Most points that a regression averages before it sees them. 1 where it sees the points
+                themselves.
+            noise_ratios (list[NoiseRatio]): Mixture of noise ratios. Empty where nothing can be regressed.
+            flat_noise_ratios (list[NoiseRatio]): Mixture of noise ratios for normals where the surface is flat. Empty where
+                there is no noise.
+            noise_deviation (float): Standard deviation of the noise of the points across the surface, length.
+            length_scale (float): Length scale of the heights of the surface over its tangent planes.
+            variance (float): Variance of these heights, length squared.
+            radius (float): Half the diagonal of the bounding box of the cloud, length. Beside it, small curvatures count as
+                0.
+            least_ratio (float | Unset): Least ratio of a curvature to its deviation at which the curvature counts as known.
+                Absent if none
+                is known.
+    """
+
+    points_per_mean: int
+    noise_ratios: list[NoiseRatio]
+    flat_noise_ratios: list[NoiseRatio]
+    noise_deviation: float
+    length_scale: float
+    variance: float
+    radius: float
+    least_ratio: float | Unset = UNSET
+
+    __repr__ = without_unset
+
+    def to_dict(self) -> dict[str, Any]:
+        points_per_mean = self.points_per_mean
+
+        noise_ratios = []
+        for noise_ratios_item_data in self.noise_ratios:
+            noise_ratios_item = noise_ratios_item_data.to_dict()
+            noise_ratios.append(noise_ratios_item)
+
+        flat_noise_ratios = []
+        for flat_noise_ratios_item_data in self.flat_noise_ratios:
+            flat_noise_ratios_item = flat_noise_ratios_item_data.to_dict()
+            flat_noise_ratios.append(flat_noise_ratios_item)
+
+        noise_deviation = self.noise_deviation
+
+        length_scale = self.length_scale
+
+        variance = self.variance
+
+        radius = self.radius
+
+        least_ratio = self.least_ratio
+
+        field_dict: dict[str, Any] = {}
+
+        field_dict.update(
+            {
+                "points_per_mean": points_per_mean,
+                "noise_ratios": noise_ratios,
+                "flat_noise_ratios": flat_noise_ratios,
+                "noise_deviation": noise_deviation,
+                "length_scale": length_scale,
+                "variance": variance,
+                "radius": radius,
+            }
+        )
+        if least_ratio is not UNSET:
+            field_dict["least_ratio"] = least_ratio
+
+        return field_dict
+
+    @classmethod
+    def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
+        from ..models.noise_ratio import NoiseRatio
+
+        d = dict(src_dict)
+        points_per_mean = d.pop("points_per_mean")
+
+        noise_ratios = []
+        _noise_ratios = d.pop("noise_ratios")
+        for noise_ratios_item_data in _noise_ratios:
+            noise_ratios_item = NoiseRatio.from_dict(noise_ratios_item_data)
+
+            noise_ratios.append(noise_ratios_item)
+
+        flat_noise_ratios = []
+        _flat_noise_ratios = d.pop("flat_noise_ratios")
+        for flat_noise_ratios_item_data in _flat_noise_ratios:
+            flat_noise_ratios_item = NoiseRatio.from_dict(flat_noise_ratios_item_data)
+
+            flat_noise_ratios.append(flat_noise_ratios_item)
+
+        noise_deviation = d.pop("noise_deviation")
+
+        length_scale = d.pop("length_scale")
+
+        variance = d.pop("variance")
+
+        radius = d.pop("radius")
+
+        least_ratio = d.pop("least_ratio", UNSET)
+
+        hyperparameters = cls(
+            points_per_mean=points_per_mean,
+            noise_ratios=noise_ratios,
+            flat_noise_ratios=flat_noise_ratios,
+            noise_deviation=noise_deviation,
+            length_scale=length_scale,
+            variance=variance,
+            radius=radius,
+            least_ratio=least_ratio,
+        )
+
+        return hyperparameters

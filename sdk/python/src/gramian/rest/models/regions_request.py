@@ -1,0 +1,176 @@
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
+
+from attrs import define as _attrs_define
+
+from ..models.duplicate_policy import DuplicatePolicy
+from ..models.solver_choice import SolverChoice
+from ..types import UNSET, Unset, without_unset
+
+if TYPE_CHECKING:
+    from ..models.cloud_ref import CloudRef
+    from ..models.hyperparameters import Hyperparameters
+    from ..models.kernel import Kernel
+
+
+T = TypeVar("T", bound="RegionsRequest")
+
+
+@_attrs_define
+class RegionsRequest:
+    """A tile: a part of a cloud with the points around it, regressed locally.
+
+    The normals of its cloud are directions outward by the signature function of the coarse cloud.
+
+        Attributes:
+            cloud (CloudRef): A cloud, given by the id of a registered cloud or by its points. Exactly one of `id` and
+                `points` is
+                given.
+            own (list[int]): The points that the tile answers for, by their positions in its cloud, ascending.
+            kernel (Kernel | Unset): A kernel `k(x, y) = variance · φ(r²)`.
+
+                Here `r = |x − y|/length_scale`, or `r² = Σ (x_c − y_c)²/length_scales_c²`. A parameter of another family
+                is refused.
+            alpha (float | Unset): Added to the diagonal of the Gram matrix as given, unit of the values squared.
+
+                0 interpolates, and the variance of the noise regresses. Default: 1e-10 if a kernel is given.
+                Without a kernel, alpha is chosen. For values it is their noise by the likelihood. For
+                surfaces it follows the noise of the points and is at least 1e-3.
+            noise_variances (list[float] | Unset): The variance of the noise at each point, instead of `alpha`. An empty
+                list counts as absent.
+            solver (SolverChoice | Unset): The method that solves the linear system.
+            duplicates (DuplicatePolicy | Unset): The treatment of points that coincide when alpha is 0.
+            hyperparameters (Hyperparameters | Unset): What local regressions learned of a cloud.
+
+                Sent as `hyperparameters` of a request about a part of the cloud, they are used as they are.
+            coarse (list[int] | Unset): The points that belong to the coarse cloud, likewise. Default: none.
+    """
+
+    cloud: CloudRef
+    own: list[int]
+    kernel: Kernel | Unset = UNSET
+    alpha: float | Unset = UNSET
+    noise_variances: list[float] | Unset = UNSET
+    solver: SolverChoice | Unset = UNSET
+    duplicates: DuplicatePolicy | Unset = UNSET
+    hyperparameters: Hyperparameters | Unset = UNSET
+    coarse: list[int] | Unset = UNSET
+
+    __repr__ = without_unset
+
+    def to_dict(self) -> dict[str, Any]:
+        cloud = self.cloud.to_dict()
+
+        own = self.own
+
+        kernel: dict[str, Any] | Unset = UNSET
+        if not isinstance(self.kernel, Unset):
+            kernel = self.kernel.to_dict()
+
+        alpha = self.alpha
+
+        noise_variances: list[float] | Unset = UNSET
+        if not isinstance(self.noise_variances, Unset):
+            noise_variances = self.noise_variances
+
+        solver: str | Unset = UNSET
+        if not isinstance(self.solver, Unset):
+            solver = self.solver.value
+
+        duplicates: str | Unset = UNSET
+        if not isinstance(self.duplicates, Unset):
+            duplicates = self.duplicates.value
+
+        hyperparameters: dict[str, Any] | Unset = UNSET
+        if not isinstance(self.hyperparameters, Unset):
+            hyperparameters = self.hyperparameters.to_dict()
+
+        coarse: list[int] | Unset = UNSET
+        if not isinstance(self.coarse, Unset):
+            coarse = self.coarse
+
+        field_dict: dict[str, Any] = {}
+
+        field_dict.update(
+            {
+                "cloud": cloud,
+                "own": own,
+            }
+        )
+        if kernel is not UNSET:
+            field_dict["kernel"] = kernel
+        if alpha is not UNSET:
+            field_dict["alpha"] = alpha
+        if noise_variances is not UNSET:
+            field_dict["noise_variances"] = noise_variances
+        if solver is not UNSET:
+            field_dict["solver"] = solver
+        if duplicates is not UNSET:
+            field_dict["duplicates"] = duplicates
+        if hyperparameters is not UNSET:
+            field_dict["hyperparameters"] = hyperparameters
+        if coarse is not UNSET:
+            field_dict["coarse"] = coarse
+
+        return field_dict
+
+    @classmethod
+    def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
+        from ..models.cloud_ref import CloudRef
+        from ..models.hyperparameters import Hyperparameters
+        from ..models.kernel import Kernel
+
+        d = dict(src_dict)
+        cloud = CloudRef.from_dict(d.pop("cloud"))
+
+        own = cast(list[int], d.pop("own"))
+
+        _kernel = d.pop("kernel", UNSET)
+        kernel: Kernel | Unset
+        if isinstance(_kernel, Unset):
+            kernel = UNSET
+        else:
+            kernel = Kernel.from_dict(_kernel)
+
+        alpha = d.pop("alpha", UNSET)
+
+        noise_variances = cast(list[float], d.pop("noise_variances", UNSET))
+
+        _solver = d.pop("solver", UNSET)
+        solver: SolverChoice | Unset
+        if isinstance(_solver, Unset):
+            solver = UNSET
+        else:
+            solver = SolverChoice(_solver)
+
+        _duplicates = d.pop("duplicates", UNSET)
+        duplicates: DuplicatePolicy | Unset
+        if isinstance(_duplicates, Unset):
+            duplicates = UNSET
+        else:
+            duplicates = DuplicatePolicy(_duplicates)
+
+        _hyperparameters = d.pop("hyperparameters", UNSET)
+        hyperparameters: Hyperparameters | Unset
+        if isinstance(_hyperparameters, Unset):
+            hyperparameters = UNSET
+        else:
+            hyperparameters = Hyperparameters.from_dict(_hyperparameters)
+
+        coarse = cast(list[int], d.pop("coarse", UNSET))
+
+        regions_request = cls(
+            cloud=cloud,
+            own=own,
+            kernel=kernel,
+            alpha=alpha,
+            noise_variances=noise_variances,
+            solver=solver,
+            duplicates=duplicates,
+            hyperparameters=hyperparameters,
+            coarse=coarse,
+        )
+
+        return regions_request
