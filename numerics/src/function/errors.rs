@@ -34,90 +34,92 @@ pub(crate) struct Process<'a> {
     pub(crate) trend: Option<&'a Trend>,
 }
 
-/// Returns the root mean square errors of functionals of a fitted function, `[functionals]`, under a process.
-///
-/// The process must have the derivatives that the functionals use.
-///
-/// # Errors
-/// [`NumericsError::MeanNotDetermined`], [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
-pub(crate) fn errors_under(
-    process: &Process<'_>,
-    interpolant: &Interpolant,
-    queries: &Cloud,
-    functionals: &[JetFunctional],
-    observer: &dyn Observer,
-) -> Result<Vec<f64>> {
-    let mut found = Vec::with_capacity(functionals.len());
-    for block in functionals.chunks(JUDGED_AT_ONCE) {
-        // Normalised so that squares do not overflow.
-        let sizes: Vec<f64> = block.iter().map(|functional| functional.size(process.kernel)).collect();
-        let block: Vec<JetFunctional> = block.iter().zip(&sizes).map(|(of, &size)| of.over(size)).collect();
-        let errors = errors_of_block(process, interpolant, queries, &block, observer)?;
-        found.extend(errors.iter().zip(sizes).map(|(error, size)| error * size));
-    }
-    Ok(found)
+/// A fitted function at queries, judged under a process.
+pub(crate) struct Judgement<'a> {
+    pub(crate) process: Process<'a>,
+    pub(crate) interpolant: &'a Interpolant,
+    pub(crate) queries: &'a Cloud,
 }
 
-/// Returns the root mean square errors of one block of functionals.
-fn errors_of_block(
-    process: &Process<'_>,
-    interpolant: &Interpolant,
-    queries: &Cloud,
-    functionals: &[JetFunctional],
-    observer: &dyn Observer,
-) -> Result<Vec<f64>> {
-    let (solver, n) = (&interpolant.solver, interpolant.solver.n_points());
-    let cloud = solver.cloud();
-    observer.checkpoint()?;
-    let weights = weights_on_values(interpolant, queries, functionals)?;
-    observer.enter(Stage::Evaluate);
-    let mut covariances = vec![0.0; n * functionals.len()];
-    Covariant::of(cloud, process.kernel).fill(functionals, queries, &mut covariances);
-    let images = values_of_each(cloud, process.kernel, &weights, cloud, observer)?;
-    let means: Option<Vec<f64>> = process.trend.map(|trend| cloud.points().map(|x| trend.at(x)).collect());
-    let noise: Vec<f64> = match solver.regularization() {
-        Regularization::Uniform(_) => vec![process.noise; n],
-        Regularization::PerPoint(given) => {
-            given.iter().map(|given| (given / process.factor).max(process.noise)).collect()
+impl Judgement<'_> {
+    /// Returns the root mean square errors of functionals of the function, `[functionals]`.
+    ///
+    /// The process must have the derivatives that the functionals use.
+    ///
+    /// # Errors
+    /// [`NumericsError::MeanNotDetermined`], [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
+    pub(crate) fn errors(&self, functionals: &[JetFunctional], observer: &dyn Observer) -> Result<Vec<f64>> {
+        let mut found = Vec::with_capacity(functionals.len());
+        for block in functionals.chunks(JUDGED_AT_ONCE) {
+            // Normalised so that squares do not overflow.
+            let sizes: Vec<f64> =
+                block.iter().map(|functional| functional.size(self.process.kernel)).collect();
+            let block: Vec<JetFunctional> =
+                block.iter().zip(&sizes).map(|(of, &size)| of.over(size)).collect();
+            let errors = self.errors_of_block(&block, observer)?;
+            found.extend(errors.iter().zip(sizes).map(|(error, size)| error * size));
         }
-    };
-    let error = |at: usize| {
-        let functional = &functionals[at];
-        let of = |all: &[f64]| -> f64 { dot(&all[at * n..][..n], &weights[at * n..][..n]) };
-        let spread = functional.prior_variance(process.kernel) - 2.0 * of(&covariances) + of(&images);
-        let own = &weights[at * n..][..n];
-        let of_noise: f64 = own.iter().zip(&noise).map(|(weight, noise)| noise * weight * weight).sum();
-        let bias = match (process.trend, &means) {
-            (Some(trend), Some(means)) => functional.of_mean(trend, queries) - dot(means, own),
-            _ => 0.0,
-        };
-        // Rounding may make the spread negative. NaN propagates.
-        let spread = if spread < 0.0 { 0.0 } else { spread };
-        (process.factor * (spread + of_noise) + bias * bias).sqrt()
-    };
-    Ok((0..functionals.len()).into_par_iter().map(error).collect())
-}
+        Ok(found)
+    }
 
-/// Returns w of each functional, its weights on the values: `[functionals, n]`.
-///
-/// If the function has a mean, w includes the estimate of its coefficients from the values.
-fn weights_on_values(
-    interpolant: &Interpolant,
-    queries: &Cloud,
-    functionals: &[JetFunctional],
-) -> Result<Vec<f64>> {
-    let (solver, n) = (&interpolant.solver, interpolant.solver.n_points());
-    let mut weights = vec![0.0; n * functionals.len()];
-    Covariant::of(solver.cloud(), solver.kernel()).fill(functionals, queries, &mut weights);
-    solver.solve_transposed_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, functionals.len()));
-    let Some(trend) = &interpolant.solution.trend else { return Ok(weights) };
-    let basis = trend.basis();
-    let exact = |at: usize| {
-        let functional: &JetFunctional = &functionals[at];
-        Some(functional.on_mean(basis, queries.point(functional.query)))
-    };
-    basis.make_exact(solver, &mut weights, exact).ok_or(NumericsError::MeanNotDetermined)?;
-    Ok(weights)
+    /// Returns the root mean square errors of one block of functionals.
+    fn errors_of_block(&self, functionals: &[JetFunctional], observer: &dyn Observer) -> Result<Vec<f64>> {
+        let Self { process, interpolant, queries } = self;
+        let (solver, n) = (&interpolant.solver, interpolant.solver.n_points());
+        let cloud = solver.cloud();
+        observer.checkpoint()?;
+        let weights = self.weights_on_values(functionals)?;
+        observer.enter(Stage::Evaluate);
+        let mut covariances = vec![0.0; n * functionals.len()];
+        Covariant::of(cloud, process.kernel).fill(functionals, queries, &mut covariances);
+        let images = values_of_each(cloud, process.kernel, &weights, cloud, observer)?;
+        let means: Option<Vec<f64>> =
+            process.trend.map(|trend| cloud.points().map(|x| trend.at(x)).collect());
+        let noise: Vec<f64> = match solver.regularization() {
+            Regularization::Uniform(_) => vec![process.noise; n],
+            Regularization::PerPoint(given) => {
+                given.iter().map(|given| (given / process.factor).max(process.noise)).collect()
+            }
+        };
+        let error = |at: usize| {
+            let functional = &functionals[at];
+            let of = |all: &[f64]| -> f64 { dot(&all[at * n..][..n], &weights[at * n..][..n]) };
+            let spread = functional.prior_variance(process.kernel) - 2.0 * of(&covariances) + of(&images);
+            let own = &weights[at * n..][..n];
+            let of_noise: f64 = own.iter().zip(&noise).map(|(weight, noise)| noise * weight * weight).sum();
+            let bias = match (process.trend, &means) {
+                (Some(trend), Some(means)) => functional.of_mean(trend, queries) - dot(means, own),
+                _ => 0.0,
+            };
+            // Rounding may make the spread negative. NaN propagates.
+            let spread = if spread < 0.0 { 0.0 } else { spread };
+            (process.factor * (spread + of_noise) + bias * bias).sqrt()
+        };
+        Ok((0..functionals.len()).into_par_iter().map(error).collect())
+    }
+
+    /// Returns w of each functional, its weights on the values: `[functionals, n]`.
+    ///
+    /// If the function has a mean, w includes the estimate of its coefficients from the values.
+    fn weights_on_values(&self, functionals: &[JetFunctional]) -> Result<Vec<f64>> {
+        let Self { interpolant, queries, .. } = self;
+        let (solver, n) = (&interpolant.solver, interpolant.solver.n_points());
+        let mut weights = vec![0.0; n * functionals.len()];
+        Covariant::of(solver.cloud(), solver.kernel()).fill(functionals, queries, &mut weights);
+        solver.solve_transposed_in_place(MatMut::from_column_major_slice_mut(
+            &mut weights,
+            n,
+            functionals.len(),
+        ));
+        let Some(trend) = &interpolant.solution.trend else { return Ok(weights) };
+        let basis = trend.basis();
+        let exact = |at: usize| {
+            let functional: &JetFunctional = &functionals[at];
+            Some(functional.on_mean(basis, queries.point(functional.query)))
+        };
+        basis.make_exact(solver, &mut weights, exact).ok_or(NumericsError::MeanNotDetermined)?;
+        Ok(weights)
+    }
 }
 
 #[cfg(test)]
@@ -163,7 +165,8 @@ mod tests {
                 let u = fit(&kernel, mean);
                 let process =
                     Process { kernel: &kernel, noise: ALPHA, factor: 1.0, trend: u.solution.trend.as_ref() };
-                let found = errors_under(&process, &u, &queries, &functionals, &Unobserved).unwrap();
+                let judgement = Judgement { process, interpolant: &u, queries: &queries };
+                let found = judgement.errors(&functionals, &Unobserved).unwrap();
                 let fit = ScaledFit { solver: &u.solver, solution: &u.solution, factor: 1.0 };
                 let expected = deviations(fit, &queries, &functionals, &Unobserved).unwrap().found;
                 for ((a, b), functional) in found.iter().zip(&expected).zip(&functionals) {
@@ -182,7 +185,8 @@ mod tests {
         let (u, with_mean) = (fit(&kernel, Mean::Zero), fit(&kernel, Mean::Constant));
         let errors = |noise, trend| {
             let process = Process { kernel: &kernel, noise, factor: 1.0, trend };
-            errors_under(&process, &u, &queries, &functionals, &Unobserved).unwrap()
+            let judgement = Judgement { process, interpolant: &u, queries: &queries };
+            judgement.errors(&functionals, &Unobserved).unwrap()
         };
         let told = errors(ALPHA, None);
         let untold = errors(100.0 * ALPHA, None);

@@ -61,46 +61,45 @@ pub fn alpha_path(
     for &alpha in alphas {
         Regularization::uniform(alpha)?;
     }
-    let subject = Subject::of(cloud, values, mean)?;
+    let path = Path { subject: Subject::of(cloud, values, mean)?, at, alphas, criterion };
     if is_decomposed(cloud.n_points(), alphas.len()) {
-        by_spectrum(&subject, at, alphas, criterion, observer)
+        path.by_spectrum(observer)
     } else {
-        by_factors(&subject, at, alphas, criterion, observer)
+        path.by_factors(observer)
     }
 }
 
-/// Scores each α by a factorization of its own.
-fn by_factors(
-    subject: &Subject<'_>,
-    at: &Hyperparameters,
-    alphas: &[f64],
+/// Values with the α to score.
+struct Path<'a> {
+    subject: Subject<'a>,
+    at: &'a Hyperparameters,
+    alphas: &'a [f64],
     criterion: Criterion,
-    observer: &dyn Observer,
-) -> Result<Vec<f64>> {
-    let mut evaluator = Evaluator::new(subject, criterion, false);
-    let score = |&alpha: &f64| {
-        let at = Hyperparameters { noise: Regularization::uniform(alpha)?, ..at.clone() };
-        Ok(evaluator.score(&at, observer)?.map_or(f64::NAN, |state| state.score))
-    };
-    alphas.iter().map(score).collect()
 }
 
-/// Scores all α by one eigendecomposition.
-fn by_spectrum(
-    subject: &Subject<'_>,
-    at: &Hyperparameters,
-    alphas: &[f64],
-    criterion: Criterion,
-    observer: &dyn Observer,
-) -> Result<Vec<f64>> {
-    let kernel = at.kernel_on(subject.cloud)?;
-    let is_restricted = criterion.needs_diagonal() && subject.n_functions > 0;
-    let spectrum = Spectrum::of(subject, &kernel, is_restricted, observer)?;
-    observer.enter(Stage::Evaluate);
-    match criterion {
-        Criterion::MarginalLikelihood => spectrum.likelihoods(subject, alphas, observer),
-        Criterion::LeaveOneOut => spectrum.left_out(alphas, observer),
-        Criterion::GeneralizedCrossValidation => spectrum.cross_validations(alphas, observer),
+impl Path<'_> {
+    /// Scores each α by a factorization of its own.
+    fn by_factors(&self, observer: &dyn Observer) -> Result<Vec<f64>> {
+        let mut evaluator = Evaluator::new(&self.subject, self.criterion, false);
+        let score = |&alpha: &f64| {
+            let at = Hyperparameters { noise: Regularization::uniform(alpha)?, ..self.at.clone() };
+            Ok(evaluator.score(&at, observer)?.map_or(f64::NAN, |state| state.score))
+        };
+        self.alphas.iter().map(score).collect()
+    }
+
+    /// Scores all α by one eigendecomposition.
+    fn by_spectrum(&self, observer: &dyn Observer) -> Result<Vec<f64>> {
+        let Self { subject, at, alphas, criterion } = self;
+        let kernel = at.kernel_on(subject.cloud)?;
+        let is_restricted = criterion.needs_diagonal() && subject.n_functions > 0;
+        let spectrum = Spectrum::of(subject, &kernel, is_restricted, observer)?;
+        observer.enter(Stage::Evaluate);
+        match criterion {
+            Criterion::MarginalLikelihood => spectrum.likelihoods(subject, alphas, observer),
+            Criterion::LeaveOneOut => spectrum.left_out(alphas, observer),
+            Criterion::GeneralizedCrossValidation => spectrum.cross_validations(alphas, observer),
+        }
     }
 }
 

@@ -33,7 +33,9 @@ fn every_alpha_has_the_score_that_it_has_alone() {
             let path =
                 alpha_path((&cloud, &values, mean), &at(9.0), &alphas, criterion, &Unobserved).unwrap();
             assert_eq!(path.len(), 300);
-            let by_factors = by_factors(&subject, &at(9.0), &alphas[..3], criterion, &Unobserved).unwrap();
+            let own = Subject::of(&cloud, &values, mean).unwrap();
+            let few = Path { subject: own, at: &at(9.0), alphas: &alphas[..3], criterion };
+            let by_factors = few.by_factors(&Unobserved).unwrap();
             assert!(path.iter().zip(&by_factors).all(|(a, b)| (a - b).abs() < 1e-8 * b.abs()));
             for (found, &alpha) in path.iter().zip(&alphas).step_by(17) {
                 let mut evaluator = Evaluator::new(&subject, criterion, false);

@@ -11,7 +11,7 @@ use super::super::geometry::Geometry;
 use super::deviations::functionals;
 use super::{Operator, regular};
 use crate::error::{NumericsError, Result};
-use crate::function::errors::{Process, errors_under};
+use crate::function::errors::{Judgement, Process};
 use crate::function::functionals::{JetFunctional, ScaledFit, deviations, has_variance};
 use crate::function::interpolant::Interpolant;
 use crate::kernel::Kernel;
@@ -21,6 +21,7 @@ use crate::points::cloud::Cloud;
 use crate::points::neighbours::{Neighbour, Neighbours};
 use crate::points::thinning::thinned_points;
 use crate::selection::Learned;
+use crate::solver::trend::Trend;
 use crate::sums::regularization::Regularization;
 
 /// Most functionals whose errors are computed. They cost little beside a factorization of as many points as
@@ -136,9 +137,12 @@ impl Judged<'_> {
         let (interpolant, queries) = (self.interpolant, self.queries);
         let (solver, solution) = (&*interpolant.solver, &*interpolant.solution);
         let (kernel, factor) = (&self.process()?.0, self.process()?.1);
+        let errors_under = |noise: f64, trend: Option<&Trend>| {
+            let process = Process { kernel, noise, factor, trend };
+            Judgement { process, interpolant, queries }.errors(functionals, observer)
+        };
         if let Some(Learned { ratio, trend, .. }) = self.learned {
-            let process = Process { kernel, noise: *ratio, factor, trend: trend.as_ref() };
-            return errors_under(&process, interpolant, queries, functionals, observer);
+            return errors_under(*ratio, trend.as_ref());
         }
         match deviations(ScaledFit { solver, solution, factor }, queries, functionals, observer) {
             // The pivoted fallback has no variances, but it has weights.
@@ -147,8 +151,7 @@ impl Judged<'_> {
                     Regularization::Uniform(alpha) => *alpha,
                     Regularization::PerPoint(_) => 0.0,
                 };
-                let process = Process { kernel, noise, factor, trend: solution.trend.as_ref() };
-                errors_under(&process, interpolant, queries, functionals, observer)
+                errors_under(noise, solution.trend.as_ref())
             }
             found => found.map(|found| found.found),
         }
