@@ -20,7 +20,7 @@ async fn a_part_with_the_hyperparameters_of_the_whole_answers_as_the_whole() {
     let ask = |cloud: &[[f64; 3]]| json!({"cloud": {"points": cloud}, "solver": "local", "include": ["deviations"], "queries": queries});
     let whole = server.post("/v1/curvatures", &ask(&points)).await.expect_ok();
     let known = &whole["diagnostics"]["hyperparameters"];
-    assert_eq!((&known["points_per_mean"], &whole["diagnostics"]["reach"]), (&json!(1), &json!(48)));
+    assert_eq!((&known["points_per_mean"], &whole["diagnostics"]["reach"]), (&json!(1), &json!(152)));
     let mut body = ask(&part);
     body["hyperparameters"] = known.clone();
     let answer = server.post("/v1/curvatures", &body).await.expect_ok();

@@ -2,7 +2,7 @@
 //! nearest points.
 //!
 //! The height is the sum of a quadric, the entailed height that its curvature implies beyond second order, a
-//! Gaussian process and noise (`regression`). PatchHyperparameters come from the likelihood pooled over a sample
+//! Gaussian process and noise (`regression`). Hyperparameters come from the likelihood pooled over a sample
 //! of neighbourhoods (`pooled`). The size of the neighbourhoods is chosen along with them and grows with the
 //! noise (`means`). The posterior gives normal and curvatures with their deviations (`estimate`). Everything
 //! is local: work and memory are linear in points and queries.
@@ -60,7 +60,7 @@ pub struct NoiseRatio {
     pub log_share: f64,
 }
 
-/// PatchHyperparameters that local regressions learn of a cloud. With them, a part of the cloud is regressed as
+/// Hyperparameters that local regressions learn of a cloud. With them, a part of the cloud is regressed as
 /// the whole is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PatchHyperparameters {
@@ -88,7 +88,7 @@ pub struct Patches {
     kernel: PatchKernel,
 }
 
-/// PatchHyperparameters of the covariance of the heights: medians over the sites.
+/// Hyperparameters of the covariance of the heights: medians over the sites.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PatchKernel {
     /// Length scale ℓ, unit L.
@@ -262,7 +262,7 @@ impl Patches {
         self.noise
     }
 
-    /// PatchHyperparameters of the covariance of the heights: medians over the sites.
+    /// Hyperparameters of the covariance of the heights: medians over the sites.
     pub fn kernel(&self) -> PatchKernel {
         self.kernel
     }

@@ -23,7 +23,7 @@ from gramian.dask.cells.cut import Cut
 from gramian.dask.cells.parts import Reach, distinct, join, look, rim, split
 from gramian.dask.surface import probe
 from gramian.replicas import Replicas
-from gramian.resources.tiles import choose_coarse
+from gramian.tiling import choose_coarse
 from gramian.wire.tensors import Array
 
 NOWHERE = "http://127.0.0.1:9"

@@ -61,8 +61,8 @@ pub struct Fit {
 
 /// Declares a request. The fields of a fit and the request's own fields are members of the same object.
 ///
-/// `with` names the field that holds the [`Geometry`] of the surface, where the request has one. `taking` adds
-/// the hyperparameters of a surface.
+/// `with` names the field that holds the [`Geometry`] of the surface, where the request has one. `taking`
+/// adds the hyperparameters of a surface.
 macro_rules! request {
     (
         $(#[$meta:meta])*
@@ -98,8 +98,8 @@ macro_rules! request {
             pub duplicates: Option<$crate::http::fields::DuplicatePolicy>,
             $($(#[$field_meta])* pub $field: $type,)*
             $(
-                /// What local regressions take instead of learning it: the hyperparameters of an answer about a
-                /// cloud that has the points of this surface.
+                /// What local regressions take instead of learning it: the hyperparameters of an answer
+                /// about a cloud that has the points of this surface.
                 pub $hyperparameters: Option<$crate::http::fields::Hyperparameters>,
             )?
         }

@@ -13,7 +13,6 @@ use super::operation::{estimate, serve};
 use super::plan::Lack;
 use super::planner::{GivenValues, Planner};
 use crate::config::Config;
-use crate::http::compute::JobObserver;
 use crate::http::fields::{CloudRef, Fit, SolverChoice};
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
@@ -76,7 +75,7 @@ async fn the_solver_follows_the_request_and_the_limit_of_the_dense_one() {
     let plan = |n: usize, solver| {
         let planner = Planner::new(&app, OWNER);
         let values = GivenValues::one(vec![0.0; n]);
-        planner.values_fit(fit(n, solver), values, None).map(|(planned, _)| planned.solver())
+        planner.values_fit(fit(n, solver), values, None).map(|(planned, _)| planned.solver)
     };
     assert_eq!(plan(1000, SolverChoice::Auto).unwrap(), SolverKind::Dense);
     assert_eq!(plan(1001, SolverChoice::Auto).unwrap(), SolverKind::Local);

@@ -34,7 +34,7 @@ const SAYS_SIGN: f64 = 0.2;
 /// among them seven tenths of the normals that are off by 30°.
 const UNCERTAIN_NORMAL: f64 = 0.3;
 
-/// SurfaceHyperparameters of a surface by local regressions, learned of the whole cloud.
+/// Hyperparameters of a surface by local regressions, learned of the whole cloud.
 ///
 /// A part of the cloud that is given them has the surface of the whole.
 #[derive(Debug, Clone, PartialEq)]
@@ -169,17 +169,18 @@ impl LocalSurface {
 
     /// Returns on how many of the nearest positions an answer at a point depends, at most.
     ///
-    /// Regressions see 16, 30 or 50 positions in dimensions 2, 3 and 4, and sparse operators 13, 38 or 88.
-    /// Of means, neighbourhoods reach as far as twice the points that these have.
+    /// Regressions see 16, 30 or 50 positions in dimensions 2, 3 and 4, and sides a few more. Neighbourhoods
+    /// of means reach as far as twice the points that these have. Rows of sparse operators see four times 13,
+    /// 38 or 88 where the nearest lie on one side. The few rows that then look farther are not counted.
     pub fn reach(&self) -> usize {
-        let of_points = match self.cloud.dimension() {
-            2 => 24,
-            3 => 48,
-            _ => 96,
+        let (of_regressions, of_rows) = match self.cloud.dimension() {
+            2 => (24, 52),
+            3 => (48, 152),
+            _ => (96, 352),
         };
         match self.patches.points_per_mean() {
-            1 => of_points,
-            group => 2 * group * of_points,
+            1 => of_rows,
+            group => of_rows.max(2 * group * of_regressions),
         }
     }
 

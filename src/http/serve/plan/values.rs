@@ -69,7 +69,7 @@ impl PlannedValues {
         matches!(self.regularization, Some(Regularization::PerPoint(_)))
     }
 
-    pub(super) fn lack(&self) -> Option<Lack> {
+    pub(in crate::http::serve) fn lack(&self) -> Option<Lack> {
         if self.unlearned().is_some() {
             return Some(Lack::Learned);
         }

@@ -12,9 +12,9 @@ from ..answers import Interpolation
 from ..arguments.fit import Kernel, ValuesFit
 from ..client import Client
 from ..replicas import Replicas
-from ..resources.tiles import choose_coarse
 from ..rest.models import KernelUsed
 from ..rest.types import Unset
+from ..tiling import choose_coarse
 from ..wire.tensors import Array
 from .cells.parts import Part, Reach, join
 from .cells.plan import Plan, nearest_to

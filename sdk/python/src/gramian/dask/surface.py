@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from operator import getitem
-from typing import Any
+from typing import Any, cast
 
 import dask
 import dask.array as da
@@ -20,8 +20,8 @@ from ..arguments.fit import Fit
 from ..client import Client
 from ..cloud import Cloud
 from ..replicas import Replicas
-from ..resources.tiles import choose_coarse, choose_sides, find_regions
 from ..rest.models import Hyperparameters
+from ..tiling import choose_coarse, choose_sides, find_regions
 from ..wire.tensors import Array
 from .cells import graph
 from .cells.cut import Ints
@@ -52,9 +52,9 @@ class Whole:
         def call(client: Client) -> Whole:
             cloud = client.cloud(sample.points)
             learned = cloud.normals(sample.points[:1], solver="local", sites=plan.sites.points).diagnostics
-            noise = learned.hyperparameters.noise_deviation
-            coarse, fit = choose_coarse(client, plan.sample.points, noise_deviation=noise)
-            return cls(learned.hyperparameters, int(learned.reach), plan.sample[coarse], fit)
+            known = cast("Hyperparameters", learned.hyperparameters)  # local regressions always have them
+            coarse, fit = choose_coarse(client, plan.sample.points, noise_deviation=known.noise_deviation)
+            return cls(known, cast("int", learned.reach), plan.sample[coarse], fit)
 
         return replicas.ask(0, call)
 

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments.fit import Fit
-from ..arguments.normalise import REQUEST, Rule
-from ..client import Client
-from ..cloud import Cloud
-from ..rest.models import CoarseResponse, Hyperparameters, SidesResponse
-from ..wire.tensors import JSON, Array, Integers, Members
+from .arguments.fit import Fit
+from .arguments.normalise import REQUEST, Rule
+from .client import Client
+from .cloud import Cloud
+from .rest.models import CoarseResponse, Hyperparameters, SidesResponse
+from .wire.tensors import JSON, Array, Integers, Members
 
 REGIONS: Mapping[str, Rule] = {
     **REQUEST,
