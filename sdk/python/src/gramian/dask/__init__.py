@@ -11,9 +11,6 @@ np.float64(2.0)
 A cloud is cut into cells with equally many points, by halving across the widest side. A tile is a cell with its halo,
 the nearest neighbours of its points beyond its sides, and with what the service learns from the cloud as a whole, so
 that answers are those of one request for all points. Which side is outward one coarse cloud says for all tiles.
-
-`connect` says where replicas are, `Service.tiles` cuts, and `Tiles` has the methods, which return Dask arrays in the
-order of the points (`Normals`, `Curvatures`, `Interpolation`, `SparseOperator`).
 """
 
 from ..replicas import Replicas

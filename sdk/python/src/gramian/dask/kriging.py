@@ -16,9 +16,9 @@ from ..rest.models import KernelUsed
 from ..rest.types import Unset
 from ..tiling import choose_coarse
 from ..wire.tensors import Array
+from .cells.graph import Rows
 from .cells.parts import Part, Reach, join
 from .cells.plan import Plan, nearest_to
-from .requests import Rows
 
 NEIGHBOURS = 128
 """Number of points from which the service kriges each query."""
@@ -79,10 +79,9 @@ class Law:
     def reach(self) -> Reach:
         """Which points kriging looks at: the nearest ones as a kernel with a length scale for each axis measures."""
         scales = self.kernel.length_scales
-        stretch = (
-            None if scales is None or isinstance(scales, Unset) else tuple(min(scales) / scale for scale in scales)
-        )
-        return Reach(NEIGHBOURS, are_distinct=False, stretch=stretch)
+        if scales is None or isinstance(scales, Unset):
+            return Reach(NEIGHBOURS, are_distinct=False)
+        return Reach(NEIGHBOURS, are_distinct=False, stretch=tuple(min(scales) / scale for scale in scales))
 
 
 @dataclass(frozen=True)

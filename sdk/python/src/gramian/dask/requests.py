@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -15,12 +14,10 @@ from ..replicas import Replicas
 from ..rest.models import Degenerate
 from ..wire.tensors import Array
 from .cells.cut import Ints
+from .cells.graph import Rows
 from .surface import Sides, SurfaceTile, Whole
 
-Rows: TypeAlias = dict[str, Any]
-"""Arrays by name, with a row for each of `index`, the rows of a cloud or of queries, ascending."""
-
-REASON = "U24"
+NO_REASONS = np.empty(0, dtype="U24")
 
 UNCERTAIN_ORIENTATION = "uncertain_orientation"
 """The side of a connected piece is nearly a matter of chance."""
@@ -35,16 +32,16 @@ def surface(replicas: Replicas, tile: SurfaceTile, sides: Sides, whole: Whole, w
         return {}
 
     def call(client: Client) -> Normals | Curvatures:
-        cloud = tile.cloud(client)
+        cloud = client.cloud(tile.part.points, tile.directions)
         ask = cloud.normals if what == "normals" else cloud.curvatures
         return ask(solver="local", deviations=deviations, hyperparameters=whole.hyperparameters)
 
     answer = replicas.ask(tile.number, call)
-    labels = tile.labels[tile.own]
+    labels, (signs, are_doubtful) = tile.labels[tile.own], sides
     reasons = _reasons(answer.degenerate, tile)
-    reasons[(reasons == "") & sides.are_doubtful[labels]] = UNCERTAIN_ORIENTATION
+    reasons[(reasons == "") & are_doubtful[labels]] = UNCERTAIN_ORIENTATION
     arrays = {name: array for name, array in vars(answer).items() if name not in NOT_PER_POINT and array is not None}
-    return {"index": tile.rows, "reasons": reasons, **_turned(arrays, tile.own, sides.signs[labels])}
+    return {"index": tile.rows, "reasons": reasons, **_turned(arrays, tile.own, signs[labels])}
 
 
 def operator(replicas: Replicas, tile: SurfaceTile, whole: Whole, what: str, n_points: int) -> Rows:
@@ -53,7 +50,7 @@ def operator(replicas: Replicas, tile: SurfaceTile, whole: Whole, what: str, n_p
         return {}
 
     def call(client: Client) -> tuple[Sequence[csr_matrix], tuple[Degenerate, ...]]:
-        cloud, known = tile.cloud(client), whole.hyperparameters
+        cloud, known = client.cloud(tile.part.points, tile.directions), whole.hyperparameters
         if what == "laplace_beltrami":
             of_values = cloud.laplace_beltrami_sparse_matrix(solver="local", hyperparameters=known)
             return [of_values.matrix], of_values.degenerate
@@ -90,6 +87,6 @@ def _turned(arrays: Mapping[str, Array], rows: Ints, signs: Array) -> dict[str, 
 
 def _reasons(degenerate: tuple[Degenerate, ...], tile: SurfaceTile) -> npt.NDArray[np.str_]:
     """Returns why answers at the points of the cell are doubtful."""
-    reasons = np.zeros(len(tile.part), dtype=REASON)
+    reasons = np.zeros(len(tile.part), dtype=NO_REASONS.dtype)
     reasons[[entry.query for entry in degenerate]] = [entry.reason.value for entry in degenerate]
     return reasons[tile.own]

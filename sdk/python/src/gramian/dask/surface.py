@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from operator import getitem
-from typing import Any, cast
+from typing import Any, TypeAlias, cast
 
 import dask
 import dask.array as da
@@ -18,7 +18,6 @@ import numpy as np
 
 from ..arguments.fit import Fit
 from ..client import Client
-from ..cloud import Cloud
 from ..replicas import Replicas
 from ..rest.models import Hyperparameters
 from ..tiling import choose_coarse, choose_sides, find_regions
@@ -101,10 +100,6 @@ class SurfaceTile:
         """Rows in the cloud of the points of the cell, `[m]`, ascending."""
         return self.part.index[self.own]
 
-    def cloud(self, client: Client) -> Cloud:
-        """Returns the tile as a cloud of a replica, with its directions."""
-        return client.cloud(self.part.points, self.directions)
-
     def labelled(self, rows: Ints | None = None) -> tuple[Ints, Ints]:
         """Returns points that have a region, by their rows in the cloud, with these regions.
 
@@ -129,18 +124,12 @@ def prepare(replicas: Replicas, number: int, core: Part, rims: Sequence[Part], w
         return SurfaceTile(number, part, own, directions, labels, regions)
 
     if len(core) == 0:
-        nothing = np.empty(0, dtype=np.int64)
-        regions: dict[str, Any] = {"regions": [], "borders": [], "n_edges": 0}
-        return SurfaceTile(number, core, nothing, core.points, nothing, regions)
+        return SurfaceTile(number, core, own, core.points, own, {"regions": [], "borders": [], "n_edges": 0})
     return replicas.ask(number, call)
 
 
-@dataclass(frozen=True)
-class Sides:
-    """Sides of the regions of a tile."""
-
-    signs: Array  # [r]: 1 or −1
-    are_doubtful: Any  # [r]
+Sides: TypeAlias = tuple[Array, Any]
+"""Of the regions of a tile: signs, 1 or −1, `[r]`, and whether the sides are doubtful, `[r]`."""
 
 
 def joined(replicas: Replicas, tiles: list[Any], inner: list[Any], outer: list[Any]) -> list[Sides]:
@@ -157,7 +146,7 @@ def joined(replicas: Replicas, tiles: list[Any], inner: list[Any], outer: list[A
     is_same = np.diff(rows[order]) == 0
     links = np.column_stack([numbers[order][:-1], numbers[order][1:]])[is_same]
     signs, are_doubtful = replicas.ask(0, lambda client: choose_sides(client, tiles, np.unique(links, axis=0)))
-    return [Sides(signs[first:last], are_doubtful[first:last]) for first, last in pairwise(firsts.tolist())]
+    return [(signs[first:last], are_doubtful[first:last]) for first, last in pairwise(firsts.tolist())]
 
 
 @dataclass(frozen=True)

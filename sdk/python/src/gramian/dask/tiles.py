@@ -16,11 +16,8 @@ from ..rest.models import Hyperparameters
 from . import answers, requests
 from .cells import graph
 from .cells.plan import Plan
-from .gathering import gathered
 from .kriging import Kriging, Law
 from .surface import SurfaceTiles
-
-NO_REASONS = np.empty(0, dtype=requests.REASON)
 
 
 @suggest_names
@@ -93,18 +90,7 @@ class Tiles:
         Kernel, noise and mean are one for all tiles. What is not given (a length scale, `alpha`, the coefficients of a
         mean) is learned here and now, from up to 256 values, where the service would look at all.
 
-        Parameters
-        ----------
-        values : array_like or dask.array.Array, `[n]`
-            At the points, V.
-        queries : array_like or dask.array.Array, `[m, d]`, optional
-            The points if absent.
-        derivatives : 0, 1 or 2, optional
-            1 for gradients, 2 for Hessians as well.
-        deviations : bool, optional
-            Whether standard deviations are wanted.
-        kernel, alpha, mean
-            As for `gramian.Cloud.interpolate`.
+        Parameters are those of `gramian.Cloud.interpolate`. Values and queries may be Dask arrays.
         """
         own = aligned(values, self._points)
         fit = ValuesFit(solver="dense", kernel=kernel, alpha=alpha, mean=mean)
@@ -117,7 +103,7 @@ class Tiles:
         asks = [
             krige(kriging, self._replicas, cell, cores[cell], rims[cell], wanted[cell]) for cell in range(self.n_tiles)
         ]
-        found = gathered(asks, asked.chunks[0], kriging.kinds(self.plan.dimension))
+        found = graph.gathered(asks, asked.chunks[0], kriging.kinds(self.plan.dimension))
         return answers.named(answers.Interpolation, found)
 
     def _of_surface(self, what: str, deviations: bool) -> dict[str, da.Array]:
@@ -134,15 +120,15 @@ class Tiles:
         if deviations:
             shapes |= {f"{name}_deviations": shape for name, shape in known.items()}
         kinds = {name: np.empty((0, *shape)) for name, shape in shapes.items()}
-        return gathered(rows, self._points.chunks[0], {**kinds, "reasons": NO_REASONS})
+        return graph.gathered(rows, self._points.chunks[0], {**kinds, "reasons": requests.NO_REASONS})
 
     def _operator(self, what: str, n_components: int) -> answers.SparseOperator:
         n = self.plan.n_points
         names = [f"matrix {component}" for component in range(n_components)]
-        kinds = {"reasons": NO_REASONS, **{name: csr_matrix((0, n)) for name in names}}
+        kinds = {"reasons": requests.NO_REASONS, **{name: csr_matrix((0, n)) for name in names}}
         surface, ask = self._in_tiles(), dask.delayed(requests.operator, pure=True)
         rows = [ask(self._replicas, tile, surface.whole, what, n) for tile in surface.tiles]
-        found = gathered(rows, self._points.chunks[0], kinds)
+        found = graph.gathered(rows, self._points.chunks[0], kinds)
         return answers.SparseOperator(tuple(found[name] for name in names), found["reasons"])
 
     def _in_tiles(self) -> SurfaceTiles:

@@ -78,8 +78,8 @@ class Cut:
                     waiting.append((self.splits[part], own))
         return cells
 
-    def depths(self, cell: int, points: Array, stretch: Array | None = None) -> Array:
+    def depths(self, cell: int, points: Array, stretch: tuple[float, ...] | None = None) -> Array:
         """Returns how far points `[n, d]` of a cell are from its nearest side, `[n]`, L or in stretched coordinates."""
         inside = np.minimum(points - self.lower[cell], self.upper[cell] - points)
-        depths: Array = (inside if stretch is None else inside * stretch).min(axis=1)
+        depths: Array = (inside if stretch is None else inside * np.array(stretch)).min(axis=1)
         return depths

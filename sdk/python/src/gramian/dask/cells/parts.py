@@ -51,11 +51,6 @@ class Reach:
     are_distinct: bool = True  # whether points that coincide count once, by the first of them
     stretch: tuple[float, ...] | None = None  # [d]: factors of coordinates before distances are taken
 
-    @property
-    def factors(self) -> Array | None:
-        """The stretch as an array."""
-        return None if self.stretch is None else np.array(self.stretch)
-
     def stretched(self, points: Array) -> Array:
         """Returns points in the coordinates in which distances are taken."""
         return points if self.stretch is None else points * np.array(self.stretch)
@@ -67,12 +62,7 @@ class Reach:
 
 def distinct(points: Array) -> Ints:
     """Returns the places of the first point of each position, ascending."""
-    if len(points) == 0:
-        return np.arange(0)
-    order = np.lexsort((np.arange(len(points)), *points.T))
-    is_first = np.ones(len(points), dtype=bool)
-    is_first[1:] = (points[order[1:]] != points[order[:-1]]).any(axis=1)
-    return np.sort(order[is_first])
+    return np.sort(np.unique(points, axis=0, return_index=True)[1])
 
 
 def split(block: Array, first: int, cut: Cut, values: Array | None = None) -> list[Part]:
@@ -106,7 +96,7 @@ def look(core: Part, cell: int, cut: Cut, reach: Reach, queries: Part | None = N
     if len(own) >= reach.count:
         tree = cKDTree(reach.stretched(own.points))
         radii = tree.query(reach.stretched(points), [reach.count])[0][:, 0]
-    beyond = radii * SLACK >= cut.depths(cell, points, reach.factors)
+    beyond = radii * SLACK >= cut.depths(cell, points, reach.stretch)
     return Looking(points[beyond], radii[beyond])
 
 
