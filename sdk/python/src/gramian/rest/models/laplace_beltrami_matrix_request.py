@@ -14,6 +14,7 @@ from ..types import UNSET, Unset, without_unset
 if TYPE_CHECKING:
     from ..models.cloud_ref import CloudRef
     from ..models.geometry import Geometry
+    from ..models.hyperparameters import Hyperparameters
     from ..models.kernel import Kernel
 
 
@@ -50,6 +51,9 @@ class LaplaceBeltramiMatrixRequest:
         mean (MeanChoice | Unset): The mean of a function: its part beside the kernel, which it tends to far from the
             points.
         format_ (MatrixFormat | Unset): The layout of a matrix.
+        hyperparameters (Hyperparameters | Unset): What local regressions learned of a cloud.
+
+            Sent as `hyperparameters` of a request about a part of the cloud, they are used as they are.
     """
 
     cloud: CloudRef
@@ -62,6 +66,7 @@ class LaplaceBeltramiMatrixRequest:
     geometry: Geometry | Unset = UNSET
     mean: MeanChoice | Unset = UNSET
     format_: MatrixFormat | Unset = UNSET
+    hyperparameters: Hyperparameters | Unset = UNSET
 
     __repr__ = without_unset
 
@@ -106,6 +111,10 @@ class LaplaceBeltramiMatrixRequest:
         if not isinstance(self.format_, Unset):
             format_ = self.format_.value
 
+        hyperparameters: dict[str, Any] | Unset = UNSET
+        if not isinstance(self.hyperparameters, Unset):
+            hyperparameters = self.hyperparameters.to_dict()
+
         field_dict: dict[str, Any] = {}
 
         field_dict.update(
@@ -131,6 +140,8 @@ class LaplaceBeltramiMatrixRequest:
             field_dict["mean"] = mean
         if format_ is not UNSET:
             field_dict["format"] = format_
+        if hyperparameters is not UNSET:
+            field_dict["hyperparameters"] = hyperparameters
 
         return field_dict
 
@@ -138,6 +149,7 @@ class LaplaceBeltramiMatrixRequest:
     def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
         from ..models.cloud_ref import CloudRef
         from ..models.geometry import Geometry
+        from ..models.hyperparameters import Hyperparameters
         from ..models.kernel import Kernel
 
         d = dict(src_dict)
@@ -198,6 +210,13 @@ class LaplaceBeltramiMatrixRequest:
         else:
             format_ = MatrixFormat(_format_)
 
+        _hyperparameters = d.pop("hyperparameters", UNSET)
+        hyperparameters: Hyperparameters | Unset
+        if isinstance(_hyperparameters, Unset):
+            hyperparameters = UNSET
+        else:
+            hyperparameters = Hyperparameters.from_dict(_hyperparameters)
+
         laplace_beltrami_matrix_request = cls(
             cloud=cloud,
             kernel=kernel,
@@ -209,6 +228,7 @@ class LaplaceBeltramiMatrixRequest:
             geometry=geometry,
             mean=mean,
             format_=format_,
+            hyperparameters=hyperparameters,
         )
 
         return laplace_beltrami_matrix_request

@@ -14,6 +14,7 @@ from ..types import UNSET, Unset, without_unset
 if TYPE_CHECKING:
     from ..models.cloud_ref import CloudRef
     from ..models.geometry import Geometry
+    from ..models.hyperparameters import Hyperparameters
     from ..models.kernel import Kernel
 
 
@@ -50,6 +51,9 @@ class LaplaceBeltramiRequest:
 
             It may come from another cloud, kernel or alpha than the values. Absent fields are taken from the request.
         include (list[ValuesInclude] | Unset): Optional parts of the answer. Default: none.
+        hyperparameters (Hyperparameters | Unset): What local regressions learned of a cloud.
+
+            Sent as `hyperparameters` of a request about a part of the cloud, they are used as they are.
     """
 
     cloud: CloudRef
@@ -63,6 +67,7 @@ class LaplaceBeltramiRequest:
     queries: list[list[float]] | Unset = UNSET
     geometry: Geometry | Unset = UNSET
     include: list[ValuesInclude] | Unset = UNSET
+    hyperparameters: Hyperparameters | Unset = UNSET
 
     __repr__ = without_unset
 
@@ -112,6 +117,10 @@ class LaplaceBeltramiRequest:
                 include_item = include_item_data.value
                 include.append(include_item)
 
+        hyperparameters: dict[str, Any] | Unset = UNSET
+        if not isinstance(self.hyperparameters, Unset):
+            hyperparameters = self.hyperparameters.to_dict()
+
         field_dict: dict[str, Any] = {}
 
         field_dict.update(
@@ -138,6 +147,8 @@ class LaplaceBeltramiRequest:
             field_dict["geometry"] = geometry
         if include is not UNSET:
             field_dict["include"] = include
+        if hyperparameters is not UNSET:
+            field_dict["hyperparameters"] = hyperparameters
 
         return field_dict
 
@@ -145,6 +156,7 @@ class LaplaceBeltramiRequest:
     def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
         from ..models.cloud_ref import CloudRef
         from ..models.geometry import Geometry
+        from ..models.hyperparameters import Hyperparameters
         from ..models.kernel import Kernel
 
         d = dict(src_dict)
@@ -209,6 +221,13 @@ class LaplaceBeltramiRequest:
 
                 include.append(include_item)
 
+        _hyperparameters = d.pop("hyperparameters", UNSET)
+        hyperparameters: Hyperparameters | Unset
+        if isinstance(_hyperparameters, Unset):
+            hyperparameters = UNSET
+        else:
+            hyperparameters = Hyperparameters.from_dict(_hyperparameters)
+
         laplace_beltrami_request = cls(
             cloud=cloud,
             values=values,
@@ -221,6 +240,7 @@ class LaplaceBeltramiRequest:
             queries=queries,
             geometry=geometry,
             include=include,
+            hyperparameters=hyperparameters,
         )
 
         return laplace_beltrami_request

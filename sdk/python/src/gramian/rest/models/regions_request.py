@@ -42,10 +42,10 @@ class RegionsRequest:
                 list counts as absent.
             solver (SolverChoice | Unset): The method that solves the linear system.
             duplicates (DuplicatePolicy | Unset): The treatment of points that coincide when alpha is 0.
+            coarse (list[int] | Unset): The points that belong to the coarse cloud, likewise. Default: none.
             hyperparameters (Hyperparameters | Unset): What local regressions learned of a cloud.
 
                 Sent as `hyperparameters` of a request about a part of the cloud, they are used as they are.
-            coarse (list[int] | Unset): The points that belong to the coarse cloud, likewise. Default: none.
     """
 
     cloud: CloudRef
@@ -55,8 +55,8 @@ class RegionsRequest:
     noise_variances: list[float] | Unset = UNSET
     solver: SolverChoice | Unset = UNSET
     duplicates: DuplicatePolicy | Unset = UNSET
-    hyperparameters: Hyperparameters | Unset = UNSET
     coarse: list[int] | Unset = UNSET
+    hyperparameters: Hyperparameters | Unset = UNSET
 
     __repr__ = without_unset
 
@@ -83,13 +83,13 @@ class RegionsRequest:
         if not isinstance(self.duplicates, Unset):
             duplicates = self.duplicates.value
 
-        hyperparameters: dict[str, Any] | Unset = UNSET
-        if not isinstance(self.hyperparameters, Unset):
-            hyperparameters = self.hyperparameters.to_dict()
-
         coarse: list[int] | Unset = UNSET
         if not isinstance(self.coarse, Unset):
             coarse = self.coarse
+
+        hyperparameters: dict[str, Any] | Unset = UNSET
+        if not isinstance(self.hyperparameters, Unset):
+            hyperparameters = self.hyperparameters.to_dict()
 
         field_dict: dict[str, Any] = {}
 
@@ -109,10 +109,10 @@ class RegionsRequest:
             field_dict["solver"] = solver
         if duplicates is not UNSET:
             field_dict["duplicates"] = duplicates
-        if hyperparameters is not UNSET:
-            field_dict["hyperparameters"] = hyperparameters
         if coarse is not UNSET:
             field_dict["coarse"] = coarse
+        if hyperparameters is not UNSET:
+            field_dict["hyperparameters"] = hyperparameters
 
         return field_dict
 
@@ -152,14 +152,14 @@ class RegionsRequest:
         else:
             duplicates = DuplicatePolicy(_duplicates)
 
+        coarse = cast(list[int], d.pop("coarse", UNSET))
+
         _hyperparameters = d.pop("hyperparameters", UNSET)
         hyperparameters: Hyperparameters | Unset
         if isinstance(_hyperparameters, Unset):
             hyperparameters = UNSET
         else:
             hyperparameters = Hyperparameters.from_dict(_hyperparameters)
-
-        coarse = cast(list[int], d.pop("coarse", UNSET))
 
         regions_request = cls(
             cloud=cloud,
@@ -169,8 +169,8 @@ class RegionsRequest:
             noise_variances=noise_variances,
             solver=solver,
             duplicates=duplicates,
-            hyperparameters=hyperparameters,
             coarse=coarse,
+            hyperparameters=hyperparameters,
         )
 
         return regions_request

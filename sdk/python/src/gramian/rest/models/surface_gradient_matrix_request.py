@@ -13,6 +13,7 @@ from ..types import UNSET, Unset, without_unset
 if TYPE_CHECKING:
     from ..models.cloud_ref import CloudRef
     from ..models.geometry import Geometry
+    from ..models.hyperparameters import Hyperparameters
     from ..models.kernel import Kernel
 
 
@@ -48,6 +49,9 @@ class SurfaceGradientMatrixRequest:
             It may come from another cloud, kernel or alpha than the values. Absent fields are taken from the request.
         mean (MeanChoice | Unset): The mean of a function: its part beside the kernel, which it tends to far from the
             points.
+        hyperparameters (Hyperparameters | Unset): What local regressions learned of a cloud.
+
+            Sent as `hyperparameters` of a request about a part of the cloud, they are used as they are.
     """
 
     cloud: CloudRef
@@ -59,6 +63,7 @@ class SurfaceGradientMatrixRequest:
     queries: list[list[float]] | Unset = UNSET
     geometry: Geometry | Unset = UNSET
     mean: MeanChoice | Unset = UNSET
+    hyperparameters: Hyperparameters | Unset = UNSET
 
     __repr__ = without_unset
 
@@ -99,6 +104,10 @@ class SurfaceGradientMatrixRequest:
         if not isinstance(self.mean, Unset):
             mean = self.mean.value
 
+        hyperparameters: dict[str, Any] | Unset = UNSET
+        if not isinstance(self.hyperparameters, Unset):
+            hyperparameters = self.hyperparameters.to_dict()
+
         field_dict: dict[str, Any] = {}
 
         field_dict.update(
@@ -122,6 +131,8 @@ class SurfaceGradientMatrixRequest:
             field_dict["geometry"] = geometry
         if mean is not UNSET:
             field_dict["mean"] = mean
+        if hyperparameters is not UNSET:
+            field_dict["hyperparameters"] = hyperparameters
 
         return field_dict
 
@@ -129,6 +140,7 @@ class SurfaceGradientMatrixRequest:
     def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
         from ..models.cloud_ref import CloudRef
         from ..models.geometry import Geometry
+        from ..models.hyperparameters import Hyperparameters
         from ..models.kernel import Kernel
 
         d = dict(src_dict)
@@ -182,6 +194,13 @@ class SurfaceGradientMatrixRequest:
         else:
             mean = MeanChoice(_mean)
 
+        _hyperparameters = d.pop("hyperparameters", UNSET)
+        hyperparameters: Hyperparameters | Unset
+        if isinstance(_hyperparameters, Unset):
+            hyperparameters = UNSET
+        else:
+            hyperparameters = Hyperparameters.from_dict(_hyperparameters)
+
         surface_gradient_matrix_request = cls(
             cloud=cloud,
             kernel=kernel,
@@ -192,6 +211,7 @@ class SurfaceGradientMatrixRequest:
             queries=queries,
             geometry=geometry,
             mean=mean,
+            hyperparameters=hyperparameters,
         )
 
         return surface_gradient_matrix_request
