@@ -7,6 +7,22 @@ use progenitor_client::{encode_path, ClientHooks, OperationInfo, RequestBuilderE
 /// Types used as operation parameters and responses.
 #[allow(clippy::all)]
 pub mod types {
+    ///What the edges between two regions say, or those within one.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    #[serde(deny_unknown_fields)]
+    pub struct Border {
+        ///The weight of the edges across which the normals agree.
+        pub agreeing: f64,
+        ///The weight of the edges across which the normals are opposite.
+        pub opposing: f64,
+        ///The positions of the two regions among those of the tile.
+        pub regions: [u64; 2usize],
+    }
+    impl Border {
+        pub fn builder() -> builder::Border {
+            Default::default()
+        }
+    }
     ///The smallest box around a cloud.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct BoundingBox {
@@ -156,6 +172,39 @@ They may have any length but 0. The side they point to is outward. An empty list
             Default::default()
         }
     }
+    ///A cloud, and how noisy it is.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    #[serde(deny_unknown_fields)]
+    pub struct CoarseRequest {
+        ///The number of points to choose. Default: a sixth of a small cloud, and at most 6,000.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub count: ::std::option::Option<::std::num::NonZeroU64>,
+        ///The standard deviation of the noise of the points across the surface. Default: 0.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub noise_deviation: ::std::option::Option<f64>,
+        ///The points of the cloud, or some of a large one, chosen evenly.
+        pub points: ::std::vec::Vec<::std::vec::Vec<f64>>,
+    }
+    impl CoarseRequest {
+        pub fn builder() -> builder::CoarseRequest {
+            Default::default()
+        }
+    }
+    ///A coarse cloud with the kernel and alpha of its signature function.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    pub struct CoarseResponse {
+        ///Added to the diagonal of its matrix.
+        pub alpha: f64,
+        ///The kernel of the signature function.
+        pub kernel: KernelUsed,
+        ///The points, by their positions in the cloud, ascending. No two coincide.
+        pub points: ::std::vec::Vec<u64>,
+    }
+    impl CoarseResponse {
+        pub fn builder() -> builder::CoarseResponse {
+            Default::default()
+        }
+    }
     ///Where a page of clouds ends, for the next one. What it is made of may change.
     #[derive(::serde::Serialize, Clone, Debug, Eq, Hash, Ord, PartialEq, PartialOrd)]
     #[serde(transparent)]
@@ -230,6 +279,10 @@ surfaces it follows the noise of the points and is at least 1e-3.*/
         ///The treatment of points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
+        /**What local regressions take instead of learning it: the hyperparameters of an answer
+about a cloud that has the points of this surface.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub hyperparameters: ::std::option::Option<Hyperparameters>,
         ///Optional parts of the answer. Default: none.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub include: ::std::vec::Vec<GeometryInclude>,
@@ -249,12 +302,6 @@ mean. The diagnostics repeat all of it.*/
         ///The points to compute at, one row of coordinates each. Default: the points of the cloud.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        /**At most 192 points of the cloud, where `"solver": "local"` learns noise and shape of the surface.
-
-Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
-the same sites and the points around them.*/
-        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
-        pub sites: ::std::vec::Vec<::std::vec::Vec<f64>>,
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
@@ -430,6 +477,9 @@ has no answer.*/
         ///Diagnostics of the fit of the surface, in answers about values on a surface.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<::std::boxed::Box<Diagnostics>>,
+        ///What local regressions learned of the cloud, or were given.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub hyperparameters: ::std::option::Option<Hyperparameters>,
         ///The kernel used, with all parameters.
         pub kernel: KernelUsed,
         /**The mean of the function: the constant, then a slope per coordinate if it is linear. Absent if the
@@ -456,6 +506,9 @@ Absent for values from the local solver, which is not evaluated at the points.*/
         ///Numerical rank of the matrix.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub rank: ::std::option::Option<u64>,
+        ///Number of positions around a point on which the answer there depends, with local regressions.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub reach: ::std::option::Option<u64>,
         ///Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): roughly the fraction of digits that survive.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub reciprocal_condition: ::std::option::Option<f64>,
@@ -782,6 +835,36 @@ counts as absent.*/
     }
     impl Health {
         pub fn builder() -> builder::Health {
+            Default::default()
+        }
+    }
+    /**What local regressions learned of a cloud.
+
+Sent as `hyperparameters` of a request about a part of the cloud, they are used as they are.*/
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    #[serde(deny_unknown_fields)]
+    pub struct Hyperparameters {
+        ///Mixture of noise ratios for normals where the surface is flat. Empty where there is no noise.
+        pub flat_noise_ratios: ::std::vec::Vec<NoiseRatio>,
+        /**Least ratio of a curvature to its deviation at which the curvature counts as known. Absent if none
+is known.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub least_ratio: ::std::option::Option<f64>,
+        ///Length scale of the heights of the surface over its tangent planes.
+        pub length_scale: f64,
+        ///Standard deviation of the noise of the points across the surface, length.
+        pub noise_deviation: f64,
+        ///Mixture of noise ratios. Empty where nothing can be regressed.
+        pub noise_ratios: ::std::vec::Vec<NoiseRatio>,
+        ///Most points that a regression averages before it sees them. 1 where it sees the points themselves.
+        pub points_per_mean: ::std::num::NonZeroU64,
+        ///Half the diagonal of the bounding box of the cloud, length. Beside it, small curvatures count as 0.
+        pub radius: f64,
+        ///Variance of these heights, length squared.
+        pub variance: f64,
+    }
+    impl Hyperparameters {
+        pub fn builder() -> builder::Hyperparameters {
             Default::default()
         }
     }
@@ -1352,6 +1435,10 @@ surfaces it follows the noise of the points and is at least 1e-3.*/
         ///The surface, if its fit differs from that of the values.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<Geometry>,
+        /**What local regressions take instead of learning it: the hyperparameters of an answer
+about a cloud that has the points of this surface.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub hyperparameters: ::std::option::Option<Hyperparameters>,
         /**The kernel. If absent, it is chosen.
 
 A surface's kernel is chosen from the cloud. A kernel for values is chosen by their
@@ -1416,6 +1503,10 @@ surfaces it follows the noise of the points and is at least 1e-3.*/
         ///The surface, if its fit differs from that of the values.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<Geometry>,
+        /**What local regressions take instead of learning it: the hyperparameters of an answer
+about a cloud that has the points of this surface.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub hyperparameters: ::std::option::Option<Hyperparameters>,
         ///Optional parts of the answer. Default: none.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub include: ::std::vec::Vec<ValuesInclude>,
@@ -1486,6 +1577,10 @@ surfaces it follows the noise of the points and is at least 1e-3.*/
         ///The surface, if it differs from that of the request.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<Geometry>,
+        /**What local regressions take instead of learning it: the hyperparameters of an answer
+about a cloud that has the points of this surface.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub hyperparameters: ::std::option::Option<Hyperparameters>,
         /**The kernel. If absent, it is chosen.
 
 A surface's kernel is chosen from the cloud. A kernel for values is chosen by their
@@ -1499,12 +1594,6 @@ mean. The diagnostics repeat all of it.*/
         ///The points to compute rows for, one row of the matrix each. Default: the points of the surface.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        /**At most 192 points of the cloud, where `"solver": "local"` learns noise and shape of the surface.
-
-Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
-the same sites and the points around them.*/
-        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
-        pub sites: ::std::vec::Vec<::std::vec::Vec<f64>>,
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
@@ -1766,6 +1855,20 @@ Empty with `noise_variances`, and for more than 3,000 points.*/
             Default::default()
         }
     }
+    ///A ratio of the variance of the noise to that of the heights, and how common it is.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    #[serde(deny_unknown_fields)]
+    pub struct NoiseRatio {
+        ///The natural logarithm of the share of neighbourhoods with this ratio.
+        pub log_share: f64,
+        ///The variance of the noise of a point divided by that of the heights.
+        pub ratio: f64,
+    }
+    impl NoiseRatio {
+        pub fn builder() -> builder::NoiseRatio {
+            Default::default()
+        }
+    }
     ///A cloud that samples a hypersurface, and queries at which to compute its normals.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
@@ -1782,6 +1885,10 @@ surfaces it follows the noise of the points and is at least 1e-3.*/
         ///The treatment of points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
+        /**What local regressions take instead of learning it: the hyperparameters of an answer
+about a cloud that has the points of this surface.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub hyperparameters: ::std::option::Option<Hyperparameters>,
         ///Optional parts of the answer. Default: none.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub include: ::std::vec::Vec<GeometryInclude>,
@@ -1803,8 +1910,7 @@ mean. The diagnostics repeat all of it.*/
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
         /**At most 192 points of the cloud, where `"solver": "local"` learns noise and shape of the surface.
 
-Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
-the same sites and the points around them.*/
+Default: 96 to 191 points that the solver chooses.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub sites: ::std::vec::Vec<::std::vec::Vec<f64>>,
         ///The method that solves the linear system.
@@ -1888,6 +1994,8 @@ answer.*/
         AssembleLaplaceBeltramiMatrix,
         #[serde(rename = "assemble_laplace_beltrami_sparse_matrix")]
         AssembleLaplaceBeltramiSparseMatrix,
+        #[serde(rename = "compute_regions")]
+        ComputeRegions,
     }
     impl ::std::fmt::Display for OperationName {
         fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
@@ -1915,6 +2023,7 @@ answer.*/
                 Self::AssembleLaplaceBeltramiSparseMatrix => {
                     f.write_str("assemble_laplace_beltrami_sparse_matrix")
                 }
+                Self::ComputeRegions => f.write_str("compute_regions"),
             }
         }
     }
@@ -1945,6 +2054,7 @@ answer.*/
                 "assemble_laplace_beltrami_sparse_matrix" => {
                     Ok(Self::AssembleLaplaceBeltramiSparseMatrix)
                 }
+                "compute_regions" => Ok(Self::ComputeRegions),
                 _ => Err("invalid value".into()),
             }
         }
@@ -2344,6 +2454,103 @@ An empty list counts as absent.*/
             Default::default()
         }
     }
+    /**Neighbouring points of a tile whose normals agree, with sums over those that the tile answers for.
+
+a is the area that a point x stands for, and ν its normal.*/
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    #[serde(deny_unknown_fields)]
+    pub struct Region {
+        ///The sum of a.
+        pub area: f64,
+        ///The mean c of x, weighted with a.
+        pub centre: ::std::vec::Vec<f64>,
+        ///The lower corner of the box around all points of the region in the tile.
+        pub lower: ::std::vec::Vec<f64>,
+        ///Number of points of the coarse cloud.
+        pub n_coarse: u64,
+        ///Number of points.
+        pub n_points: u64,
+        ///Number of points where the coarse cloud says something of the side.
+        pub n_signed: u64,
+        ///The sum of aν.
+        pub normal: ::std::vec::Vec<f64>,
+        ///The sum of a|x − c|².
+        pub spread: f64,
+        ///The upper corner of that box.
+        pub upper: ::std::vec::Vec<f64>,
+        ///The sum of a(x − c)·ν.
+        pub volume: f64,
+    }
+    impl Region {
+        pub fn builder() -> builder::Region {
+            Default::default()
+        }
+    }
+    /**A tile: a part of a cloud with the points around it, regressed locally.
+
+The normals of its cloud are directions outward by the signature function of the coarse cloud.*/
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    #[serde(deny_unknown_fields)]
+    pub struct RegionsRequest {
+        /**Added to the diagonal of the Gram matrix as given, unit of the values squared.
+
+0 interpolates, and the variance of the noise regresses. Default: 1e-10 if a kernel is given.
+Without a kernel, alpha is chosen. For values it is their noise by the likelihood. For
+surfaces it follows the noise of the points and is at least 1e-3.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub alpha: ::std::option::Option<f64>,
+        ///The points at which values are known, or that sample the surface.
+        pub cloud: CloudRef,
+        ///The points that belong to the coarse cloud, likewise. Default: none.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub coarse: ::std::vec::Vec<u64>,
+        ///The treatment of points that coincide when alpha is 0.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub duplicates: ::std::option::Option<DuplicatePolicy>,
+        /**What local regressions take instead of learning it: the hyperparameters of an answer
+about a cloud that has the points of this surface.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub hyperparameters: ::std::option::Option<Hyperparameters>,
+        /**The kernel. If absent, it is chosen.
+
+A surface's kernel is chosen from the cloud. A kernel for values is chosen by their
+likelihood, together with its variance and, unless they are given, the noise and a constant
+mean. The diagnostics repeat all of it.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub kernel: ::std::option::Option<Kernel>,
+        ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub noise_variances: ::std::vec::Vec<f64>,
+        ///The points that the tile answers for, by their positions in its cloud, ascending.
+        pub own: ::std::vec::Vec<u64>,
+        ///The method that solves the linear system.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub solver: ::std::option::Option<SolverChoice>,
+    }
+    impl RegionsRequest {
+        pub fn builder() -> builder::RegionsRequest {
+            Default::default()
+        }
+    }
+    ///The regions of a tile, with sums that decide their sides.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    pub struct RegionsResponse {
+        ///The borders between regions, and the edges within each.
+        pub borders: ::std::vec::Vec<Border>,
+        ///The numbers used, the method, its accuracy, and warnings.
+        pub diagnostics: Diagnostics,
+        ///The region of each point of the tile, or −1 for points around it that no edge leads to.
+        pub labels: ::std::vec::Vec<i64>,
+        ///The number of edges that the points would have on a surface that is sampled well.
+        pub n_edges: u64,
+        ///The regions.
+        pub regions: ::std::vec::Vec<Region>,
+    }
+    impl RegionsResponse {
+        pub fn builder() -> builder::RegionsResponse {
+            Default::default()
+        }
+    }
     ///Functions to draw from the posterior: their number and a seed.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
@@ -2492,6 +2699,33 @@ smaller one.*/
             value: ::std::string::String,
         ) -> ::std::result::Result<Self, self::error::ConversionError> {
             value.parse()
+        }
+    }
+    ///The regions of all tiles of a cloud, and which of them are parts of one region.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    #[serde(deny_unknown_fields)]
+    pub struct SidesRequest {
+        ///Pairs of regions that have a point in common, counted on from one tile to the next.
+        pub links: ::std::vec::Vec<::std::vec::Vec<u64>>,
+        ///The regions of each tile, as `POST /v1/regions` answers them.
+        pub tiles: ::std::vec::Vec<TileRegions>,
+    }
+    impl SidesRequest {
+        pub fn builder() -> builder::SidesRequest {
+            Default::default()
+        }
+    }
+    ///The sides of regions, in the order of the request.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    pub struct SidesResponse {
+        ///True for each region whose side is nearly a matter of chance.
+        pub are_doubtful: ::std::vec::Vec<bool>,
+        ///1 or −1 for each region: the sign to multiply its normals with.
+        pub signs: ::std::vec::Vec<i32>,
+    }
+    impl SidesResponse {
+        pub fn builder() -> builder::SidesResponse {
+            Default::default()
         }
     }
     ///How often a Wendland kernel is continuously differentiable.
@@ -2772,6 +3006,10 @@ surfaces it follows the noise of the points and is at least 1e-3.*/
         ///The surface, if its fit differs from that of the values.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<Geometry>,
+        /**What local regressions take instead of learning it: the hyperparameters of an answer
+about a cloud that has the points of this surface.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub hyperparameters: ::std::option::Option<Hyperparameters>,
         /**The kernel. If absent, it is chosen.
 
 A surface's kernel is chosen from the cloud. A kernel for values is chosen by their
@@ -2838,6 +3076,10 @@ surfaces it follows the noise of the points and is at least 1e-3.*/
         ///The surface, if its fit differs from that of the values.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<Geometry>,
+        /**What local regressions take instead of learning it: the hyperparameters of an answer
+about a cloud that has the points of this surface.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub hyperparameters: ::std::option::Option<Hyperparameters>,
         ///Optional parts of the answer. Default: none.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub include: ::std::vec::Vec<ValuesInclude>,
@@ -2910,6 +3152,10 @@ surfaces it follows the noise of the points and is at least 1e-3.*/
         ///The surface, if it differs from that of the request.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<Geometry>,
+        /**What local regressions take instead of learning it: the hyperparameters of an answer
+about a cloud that has the points of this surface.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub hyperparameters: ::std::option::Option<Hyperparameters>,
         /**The kernel. If absent, it is chosen.
 
 A surface's kernel is chosen from the cloud. A kernel for values is chosen by their
@@ -2923,12 +3169,6 @@ mean. The diagnostics repeat all of it.*/
         ///The points to compute rows for, one row of each matrix. Default: the points of the surface.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        /**At most 192 points of the cloud, where `"solver": "local"` learns noise and shape of the surface.
-
-Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
-the same sites and the points around them.*/
-        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
-        pub sites: ::std::vec::Vec<::std::vec::Vec<f64>>,
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
@@ -3016,6 +3256,22 @@ the same sites and the points around them.*/
             value: ::std::string::String,
         ) -> ::std::result::Result<Self, self::error::ConversionError> {
             value.parse()
+        }
+    }
+    ///The regions of a tile.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    #[serde(deny_unknown_fields)]
+    pub struct TileRegions {
+        ///Their borders.
+        pub borders: ::std::vec::Vec<Border>,
+        ///The number of edges that the points would have on a surface that is sampled well.
+        pub n_edges: u64,
+        ///The regions.
+        pub regions: ::std::vec::Vec<Region>,
+    }
+    impl TileRegions {
+        pub fn builder() -> builder::TileRegions {
+            Default::default()
         }
     }
     ///Optional parts of an answer about values.
@@ -3198,6 +3454,80 @@ the same sites and the points around them.*/
     }
     /// Types for composing complex structures.
     pub mod builder {
+        #[derive(Clone, Debug)]
+        pub struct Border {
+            agreeing: ::std::result::Result<f64, ::std::string::String>,
+            opposing: ::std::result::Result<f64, ::std::string::String>,
+            regions: ::std::result::Result<[u64; 2usize], ::std::string::String>,
+        }
+        impl ::std::default::Default for Border {
+            fn default() -> Self {
+                Self {
+                    agreeing: Err("no value supplied for agreeing".to_string()),
+                    opposing: Err("no value supplied for opposing".to_string()),
+                    regions: Err("no value supplied for regions".to_string()),
+                }
+            }
+        }
+        impl Border {
+            pub fn agreeing<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<f64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.agreeing = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for agreeing: {e}")
+                    });
+                self
+            }
+            pub fn opposing<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<f64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.opposing = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for opposing: {e}")
+                    });
+                self
+            }
+            pub fn regions<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<[u64; 2usize]>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.regions = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for regions: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<Border> for super::Border {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: Border,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    agreeing: value.agreeing?,
+                    opposing: value.opposing?,
+                    regions: value.regions?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::Border> for Border {
+            fn from(value: super::Border) -> Self {
+                Self {
+                    agreeing: Ok(value.agreeing),
+                    opposing: Ok(value.opposing),
+                    regions: Ok(value.regions),
+                }
+            }
+        }
         #[derive(Clone, Debug)]
         pub struct BoundingBox {
             max: ::std::result::Result<::std::vec::Vec<f64>, ::std::string::String>,
@@ -3613,6 +3943,167 @@ the same sites and the points around them.*/
             }
         }
         #[derive(Clone, Debug)]
+        pub struct CoarseRequest {
+            count: ::std::result::Result<
+                ::std::option::Option<::std::num::NonZeroU64>,
+                ::std::string::String,
+            >,
+            noise_deviation: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
+            points: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
+        }
+        impl ::std::default::Default for CoarseRequest {
+            fn default() -> Self {
+                Self {
+                    count: Ok(Default::default()),
+                    noise_deviation: Ok(Default::default()),
+                    points: Err("no value supplied for points".to_string()),
+                }
+            }
+        }
+        impl CoarseRequest {
+            pub fn count<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<::std::num::NonZeroU64>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.count = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for count: {e}")
+                    });
+                self
+            }
+            pub fn noise_deviation<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.noise_deviation = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for noise_deviation: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn points<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.points = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for points: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<CoarseRequest> for super::CoarseRequest {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: CoarseRequest,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    count: value.count?,
+                    noise_deviation: value.noise_deviation?,
+                    points: value.points?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::CoarseRequest> for CoarseRequest {
+            fn from(value: super::CoarseRequest) -> Self {
+                Self {
+                    count: Ok(value.count),
+                    noise_deviation: Ok(value.noise_deviation),
+                    points: Ok(value.points),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct CoarseResponse {
+            alpha: ::std::result::Result<f64, ::std::string::String>,
+            kernel: ::std::result::Result<super::KernelUsed, ::std::string::String>,
+            points: ::std::result::Result<::std::vec::Vec<u64>, ::std::string::String>,
+        }
+        impl ::std::default::Default for CoarseResponse {
+            fn default() -> Self {
+                Self {
+                    alpha: Err("no value supplied for alpha".to_string()),
+                    kernel: Err("no value supplied for kernel".to_string()),
+                    points: Err("no value supplied for points".to_string()),
+                }
+            }
+        }
+        impl CoarseResponse {
+            pub fn alpha<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<f64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.alpha = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for alpha: {e}")
+                    });
+                self
+            }
+            pub fn kernel<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::KernelUsed>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.kernel = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for kernel: {e}")
+                    });
+                self
+            }
+            pub fn points<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<u64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.points = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for points: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<CoarseResponse> for super::CoarseResponse {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: CoarseResponse,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    alpha: value.alpha?,
+                    kernel: value.kernel?,
+                    points: value.points?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::CoarseResponse> for CoarseResponse {
+            fn from(value: super::CoarseResponse) -> Self {
+                Self {
+                    alpha: Ok(value.alpha),
+                    kernel: Ok(value.kernel),
+                    points: Ok(value.points),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
         pub struct CurvaturesRequest {
             alpha: ::std::result::Result<
                 ::std::option::Option<f64>,
@@ -3621,6 +4112,10 @@ the same sites and the points around them.*/
             cloud: ::std::result::Result<super::CloudRef, ::std::string::String>,
             duplicates: ::std::result::Result<
                 ::std::option::Option<super::DuplicatePolicy>,
+                ::std::string::String,
+            >,
+            hyperparameters: ::std::result::Result<
+                ::std::option::Option<super::Hyperparameters>,
                 ::std::string::String,
             >,
             include: ::std::result::Result<
@@ -3643,10 +4138,6 @@ the same sites and the points around them.*/
                 ::std::vec::Vec<::std::vec::Vec<f64>>,
                 ::std::string::String,
             >,
-            sites: ::std::result::Result<
-                ::std::vec::Vec<::std::vec::Vec<f64>>,
-                ::std::string::String,
-            >,
             solver: ::std::result::Result<
                 ::std::option::Option<super::SolverChoice>,
                 ::std::string::String,
@@ -3662,12 +4153,12 @@ the same sites and the points around them.*/
                     alpha: Ok(Default::default()),
                     cloud: Err("no value supplied for cloud".to_string()),
                     duplicates: Ok(Default::default()),
+                    hyperparameters: Ok(Default::default()),
                     include: Ok(Default::default()),
                     kernel: Ok(Default::default()),
                     noise_variances: Ok(Default::default()),
                     orientation: Ok(Default::default()),
                     queries: Ok(Default::default()),
-                    sites: Ok(Default::default()),
                     solver: Ok(Default::default()),
                     surface: Ok(Default::default()),
                 }
@@ -3709,6 +4200,22 @@ the same sites and the points around them.*/
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for duplicates: {e}")
+                    });
+                self
+            }
+            pub fn hyperparameters<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<super::Hyperparameters>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.hyperparameters = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for hyperparameters: {e}"
+                        )
                     });
                 self
             }
@@ -3776,18 +4283,6 @@ the same sites and the points around them.*/
                     });
                 self
             }
-            pub fn sites<T>(mut self, value: T) -> Self
-            where
-                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
-                T::Error: ::std::fmt::Display,
-            {
-                self.sites = value
-                    .try_into()
-                    .map_err(|e| {
-                        format!("error converting supplied value for sites: {e}")
-                    });
-                self
-            }
             pub fn solver<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::option::Option<super::SolverChoice>>,
@@ -3822,12 +4317,12 @@ the same sites and the points around them.*/
                     alpha: value.alpha?,
                     cloud: value.cloud?,
                     duplicates: value.duplicates?,
+                    hyperparameters: value.hyperparameters?,
                     include: value.include?,
                     kernel: value.kernel?,
                     noise_variances: value.noise_variances?,
                     orientation: value.orientation?,
                     queries: value.queries?,
-                    sites: value.sites?,
                     solver: value.solver?,
                     surface: value.surface?,
                 })
@@ -3839,12 +4334,12 @@ the same sites and the points around them.*/
                     alpha: Ok(value.alpha),
                     cloud: Ok(value.cloud),
                     duplicates: Ok(value.duplicates),
+                    hyperparameters: Ok(value.hyperparameters),
                     include: Ok(value.include),
                     kernel: Ok(value.kernel),
                     noise_variances: Ok(value.noise_variances),
                     orientation: Ok(value.orientation),
                     queries: Ok(value.queries),
-                    sites: Ok(value.sites),
                     solver: Ok(value.solver),
                     surface: Ok(value.surface),
                 }
@@ -4279,6 +4774,10 @@ the same sites and the points around them.*/
                 ::std::option::Option<::std::boxed::Box<super::Diagnostics>>,
                 ::std::string::String,
             >,
+            hyperparameters: ::std::result::Result<
+                ::std::option::Option<super::Hyperparameters>,
+                ::std::string::String,
+            >,
             kernel: ::std::result::Result<super::KernelUsed, ::std::string::String>,
             mean_coefficients: ::std::result::Result<
                 ::std::vec::Vec<f64>,
@@ -4300,6 +4799,10 @@ the same sites and the points around them.*/
                 ::std::string::String,
             >,
             rank: ::std::result::Result<
+                ::std::option::Option<u64>,
+                ::std::string::String,
+            >,
+            reach: ::std::result::Result<
                 ::std::option::Option<u64>,
                 ::std::string::String,
             >,
@@ -4335,6 +4838,7 @@ the same sites and the points around them.*/
                         "no value supplied for factorization".to_string(),
                     ),
                     geometry: Ok(Default::default()),
+                    hyperparameters: Ok(Default::default()),
                     kernel: Err("no value supplied for kernel".to_string()),
                     mean_coefficients: Ok(Default::default()),
                     misfit: Ok(Default::default()),
@@ -4346,6 +4850,7 @@ the same sites and the points around them.*/
                     native_norm_squared: Ok(Default::default()),
                     noise_deviation: Ok(Default::default()),
                     rank: Ok(Default::default()),
+                    reach: Ok(Default::default()),
                     reciprocal_condition: Ok(Default::default()),
                     relative_residual: Ok(Default::default()),
                     solver: Err("no value supplied for solver".to_string()),
@@ -4415,6 +4920,22 @@ the same sites and the points around them.*/
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for geometry: {e}")
+                    });
+                self
+            }
+            pub fn hyperparameters<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<super::Hyperparameters>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.hyperparameters = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for hyperparameters: {e}"
+                        )
                     });
                 self
             }
@@ -4534,6 +5055,18 @@ the same sites and the points around them.*/
                     });
                 self
             }
+            pub fn reach<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<u64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.reach = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for reach: {e}")
+                    });
+                self
+            }
             pub fn reciprocal_condition<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::option::Option<f64>>,
@@ -4622,6 +5155,7 @@ the same sites and the points around them.*/
                     dimension: value.dimension?,
                     factorization: value.factorization?,
                     geometry: value.geometry?,
+                    hyperparameters: value.hyperparameters?,
                     kernel: value.kernel?,
                     mean_coefficients: value.mean_coefficients?,
                     misfit: value.misfit?,
@@ -4631,6 +5165,7 @@ the same sites and the points around them.*/
                     native_norm_squared: value.native_norm_squared?,
                     noise_deviation: value.noise_deviation?,
                     rank: value.rank?,
+                    reach: value.reach?,
                     reciprocal_condition: value.reciprocal_condition?,
                     relative_residual: value.relative_residual?,
                     solver: value.solver?,
@@ -4648,6 +5183,7 @@ the same sites and the points around them.*/
                     dimension: Ok(value.dimension),
                     factorization: Ok(value.factorization),
                     geometry: Ok(value.geometry),
+                    hyperparameters: Ok(value.hyperparameters),
                     kernel: Ok(value.kernel),
                     mean_coefficients: Ok(value.mean_coefficients),
                     misfit: Ok(value.misfit),
@@ -4657,6 +5193,7 @@ the same sites and the points around them.*/
                     native_norm_squared: Ok(value.native_norm_squared),
                     noise_deviation: Ok(value.noise_deviation),
                     rank: Ok(value.rank),
+                    reach: Ok(value.reach),
                     reciprocal_condition: Ok(value.reciprocal_condition),
                     relative_residual: Ok(value.relative_residual),
                     solver: Ok(value.solver),
@@ -5259,6 +5796,184 @@ the same sites and the points around them.*/
         impl ::std::convert::From<super::Health> for Health {
             fn from(value: super::Health) -> Self {
                 Self { status: Ok(value.status) }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct Hyperparameters {
+            flat_noise_ratios: ::std::result::Result<
+                ::std::vec::Vec<super::NoiseRatio>,
+                ::std::string::String,
+            >,
+            least_ratio: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
+            length_scale: ::std::result::Result<f64, ::std::string::String>,
+            noise_deviation: ::std::result::Result<f64, ::std::string::String>,
+            noise_ratios: ::std::result::Result<
+                ::std::vec::Vec<super::NoiseRatio>,
+                ::std::string::String,
+            >,
+            points_per_mean: ::std::result::Result<
+                ::std::num::NonZeroU64,
+                ::std::string::String,
+            >,
+            radius: ::std::result::Result<f64, ::std::string::String>,
+            variance: ::std::result::Result<f64, ::std::string::String>,
+        }
+        impl ::std::default::Default for Hyperparameters {
+            fn default() -> Self {
+                Self {
+                    flat_noise_ratios: Err(
+                        "no value supplied for flat_noise_ratios".to_string(),
+                    ),
+                    least_ratio: Ok(Default::default()),
+                    length_scale: Err("no value supplied for length_scale".to_string()),
+                    noise_deviation: Err(
+                        "no value supplied for noise_deviation".to_string(),
+                    ),
+                    noise_ratios: Err("no value supplied for noise_ratios".to_string()),
+                    points_per_mean: Err(
+                        "no value supplied for points_per_mean".to_string(),
+                    ),
+                    radius: Err("no value supplied for radius".to_string()),
+                    variance: Err("no value supplied for variance".to_string()),
+                }
+            }
+        }
+        impl Hyperparameters {
+            pub fn flat_noise_ratios<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::NoiseRatio>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.flat_noise_ratios = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for flat_noise_ratios: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn least_ratio<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.least_ratio = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for least_ratio: {e}")
+                    });
+                self
+            }
+            pub fn length_scale<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<f64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.length_scale = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for length_scale: {e}")
+                    });
+                self
+            }
+            pub fn noise_deviation<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<f64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.noise_deviation = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for noise_deviation: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn noise_ratios<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::NoiseRatio>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.noise_ratios = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for noise_ratios: {e}")
+                    });
+                self
+            }
+            pub fn points_per_mean<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::num::NonZeroU64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.points_per_mean = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for points_per_mean: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn radius<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<f64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.radius = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for radius: {e}")
+                    });
+                self
+            }
+            pub fn variance<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<f64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.variance = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for variance: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<Hyperparameters> for super::Hyperparameters {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: Hyperparameters,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    flat_noise_ratios: value.flat_noise_ratios?,
+                    least_ratio: value.least_ratio?,
+                    length_scale: value.length_scale?,
+                    noise_deviation: value.noise_deviation?,
+                    noise_ratios: value.noise_ratios?,
+                    points_per_mean: value.points_per_mean?,
+                    radius: value.radius?,
+                    variance: value.variance?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::Hyperparameters> for Hyperparameters {
+            fn from(value: super::Hyperparameters) -> Self {
+                Self {
+                    flat_noise_ratios: Ok(value.flat_noise_ratios),
+                    least_ratio: Ok(value.least_ratio),
+                    length_scale: Ok(value.length_scale),
+                    noise_deviation: Ok(value.noise_deviation),
+                    noise_ratios: Ok(value.noise_ratios),
+                    points_per_mean: Ok(value.points_per_mean),
+                    radius: Ok(value.radius),
+                    variance: Ok(value.variance),
+                }
             }
         }
         #[derive(Clone, Debug)]
@@ -6918,6 +7633,10 @@ the same sites and the points around them.*/
                 ::std::option::Option<super::Geometry>,
                 ::std::string::String,
             >,
+            hyperparameters: ::std::result::Result<
+                ::std::option::Option<super::Hyperparameters>,
+                ::std::string::String,
+            >,
             kernel: ::std::result::Result<
                 ::std::option::Option<super::Kernel>,
                 ::std::string::String,
@@ -6947,6 +7666,7 @@ the same sites and the points around them.*/
                     duplicates: Ok(Default::default()),
                     format: Ok(Default::default()),
                     geometry: Ok(Default::default()),
+                    hyperparameters: Ok(Default::default()),
                     kernel: Ok(Default::default()),
                     mean: Ok(Default::default()),
                     noise_variances: Ok(Default::default()),
@@ -7015,6 +7735,22 @@ the same sites and the points around them.*/
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for geometry: {e}")
+                    });
+                self
+            }
+            pub fn hyperparameters<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<super::Hyperparameters>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.hyperparameters = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for hyperparameters: {e}"
+                        )
                     });
                 self
             }
@@ -7093,6 +7829,7 @@ the same sites and the points around them.*/
                     duplicates: value.duplicates?,
                     format: value.format?,
                     geometry: value.geometry?,
+                    hyperparameters: value.hyperparameters?,
                     kernel: value.kernel?,
                     mean: value.mean?,
                     noise_variances: value.noise_variances?,
@@ -7110,6 +7847,7 @@ the same sites and the points around them.*/
                     duplicates: Ok(value.duplicates),
                     format: Ok(value.format),
                     geometry: Ok(value.geometry),
+                    hyperparameters: Ok(value.hyperparameters),
                     kernel: Ok(value.kernel),
                     mean: Ok(value.mean),
                     noise_variances: Ok(value.noise_variances),
@@ -7220,6 +7958,10 @@ the same sites and the points around them.*/
                 ::std::option::Option<super::Geometry>,
                 ::std::string::String,
             >,
+            hyperparameters: ::std::result::Result<
+                ::std::option::Option<super::Hyperparameters>,
+                ::std::string::String,
+            >,
             include: ::std::result::Result<
                 ::std::vec::Vec<super::ValuesInclude>,
                 ::std::string::String,
@@ -7253,6 +7995,7 @@ the same sites and the points around them.*/
                     cloud: Err("no value supplied for cloud".to_string()),
                     duplicates: Ok(Default::default()),
                     geometry: Ok(Default::default()),
+                    hyperparameters: Ok(Default::default()),
                     include: Ok(Default::default()),
                     kernel: Ok(Default::default()),
                     mean: Ok(Default::default()),
@@ -7311,6 +8054,22 @@ the same sites and the points around them.*/
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for geometry: {e}")
+                    });
+                self
+            }
+            pub fn hyperparameters<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<super::Hyperparameters>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.hyperparameters = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for hyperparameters: {e}"
+                        )
                     });
                 self
             }
@@ -7412,6 +8171,7 @@ the same sites and the points around them.*/
                     cloud: value.cloud?,
                     duplicates: value.duplicates?,
                     geometry: value.geometry?,
+                    hyperparameters: value.hyperparameters?,
                     include: value.include?,
                     kernel: value.kernel?,
                     mean: value.mean?,
@@ -7430,6 +8190,7 @@ the same sites and the points around them.*/
                     cloud: Ok(value.cloud),
                     duplicates: Ok(value.duplicates),
                     geometry: Ok(value.geometry),
+                    hyperparameters: Ok(value.hyperparameters),
                     include: Ok(value.include),
                     kernel: Ok(value.kernel),
                     mean: Ok(value.mean),
@@ -7561,6 +8322,10 @@ the same sites and the points around them.*/
                 ::std::option::Option<super::Geometry>,
                 ::std::string::String,
             >,
+            hyperparameters: ::std::result::Result<
+                ::std::option::Option<super::Hyperparameters>,
+                ::std::string::String,
+            >,
             kernel: ::std::result::Result<
                 ::std::option::Option<super::Kernel>,
                 ::std::string::String,
@@ -7570,10 +8335,6 @@ the same sites and the points around them.*/
                 ::std::string::String,
             >,
             queries: ::std::result::Result<
-                ::std::vec::Vec<::std::vec::Vec<f64>>,
-                ::std::string::String,
-            >,
-            sites: ::std::result::Result<
                 ::std::vec::Vec<::std::vec::Vec<f64>>,
                 ::std::string::String,
             >,
@@ -7589,10 +8350,10 @@ the same sites and the points around them.*/
                     cloud: Err("no value supplied for cloud".to_string()),
                     duplicates: Ok(Default::default()),
                     geometry: Ok(Default::default()),
+                    hyperparameters: Ok(Default::default()),
                     kernel: Ok(Default::default()),
                     noise_variances: Ok(Default::default()),
                     queries: Ok(Default::default()),
-                    sites: Ok(Default::default()),
                     solver: Ok(Default::default()),
                 }
             }
@@ -7648,6 +8409,22 @@ the same sites and the points around them.*/
                     });
                 self
             }
+            pub fn hyperparameters<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<super::Hyperparameters>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.hyperparameters = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for hyperparameters: {e}"
+                        )
+                    });
+                self
+            }
             pub fn kernel<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::option::Option<super::Kernel>>,
@@ -7686,18 +8463,6 @@ the same sites and the points around them.*/
                     });
                 self
             }
-            pub fn sites<T>(mut self, value: T) -> Self
-            where
-                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
-                T::Error: ::std::fmt::Display,
-            {
-                self.sites = value
-                    .try_into()
-                    .map_err(|e| {
-                        format!("error converting supplied value for sites: {e}")
-                    });
-                self
-            }
             pub fn solver<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::option::Option<super::SolverChoice>>,
@@ -7722,10 +8487,10 @@ the same sites and the points around them.*/
                     cloud: value.cloud?,
                     duplicates: value.duplicates?,
                     geometry: value.geometry?,
+                    hyperparameters: value.hyperparameters?,
                     kernel: value.kernel?,
                     noise_variances: value.noise_variances?,
                     queries: value.queries?,
-                    sites: value.sites?,
                     solver: value.solver?,
                 })
             }
@@ -7738,10 +8503,10 @@ the same sites and the points around them.*/
                     cloud: Ok(value.cloud),
                     duplicates: Ok(value.duplicates),
                     geometry: Ok(value.geometry),
+                    hyperparameters: Ok(value.hyperparameters),
                     kernel: Ok(value.kernel),
                     noise_variances: Ok(value.noise_variances),
                     queries: Ok(value.queries),
-                    sites: Ok(value.sites),
                     solver: Ok(value.solver),
                 }
             }
@@ -8465,6 +9230,64 @@ the same sites and the points around them.*/
             }
         }
         #[derive(Clone, Debug)]
+        pub struct NoiseRatio {
+            log_share: ::std::result::Result<f64, ::std::string::String>,
+            ratio: ::std::result::Result<f64, ::std::string::String>,
+        }
+        impl ::std::default::Default for NoiseRatio {
+            fn default() -> Self {
+                Self {
+                    log_share: Err("no value supplied for log_share".to_string()),
+                    ratio: Err("no value supplied for ratio".to_string()),
+                }
+            }
+        }
+        impl NoiseRatio {
+            pub fn log_share<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<f64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.log_share = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for log_share: {e}")
+                    });
+                self
+            }
+            pub fn ratio<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<f64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.ratio = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for ratio: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<NoiseRatio> for super::NoiseRatio {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: NoiseRatio,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    log_share: value.log_share?,
+                    ratio: value.ratio?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::NoiseRatio> for NoiseRatio {
+            fn from(value: super::NoiseRatio) -> Self {
+                Self {
+                    log_share: Ok(value.log_share),
+                    ratio: Ok(value.ratio),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
         pub struct NormalsRequest {
             alpha: ::std::result::Result<
                 ::std::option::Option<f64>,
@@ -8473,6 +9296,10 @@ the same sites and the points around them.*/
             cloud: ::std::result::Result<super::CloudRef, ::std::string::String>,
             duplicates: ::std::result::Result<
                 ::std::option::Option<super::DuplicatePolicy>,
+                ::std::string::String,
+            >,
+            hyperparameters: ::std::result::Result<
+                ::std::option::Option<super::Hyperparameters>,
                 ::std::string::String,
             >,
             include: ::std::result::Result<
@@ -8514,6 +9341,7 @@ the same sites and the points around them.*/
                     alpha: Ok(Default::default()),
                     cloud: Err("no value supplied for cloud".to_string()),
                     duplicates: Ok(Default::default()),
+                    hyperparameters: Ok(Default::default()),
                     include: Ok(Default::default()),
                     kernel: Ok(Default::default()),
                     noise_variances: Ok(Default::default()),
@@ -8561,6 +9389,22 @@ the same sites and the points around them.*/
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for duplicates: {e}")
+                    });
+                self
+            }
+            pub fn hyperparameters<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<super::Hyperparameters>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.hyperparameters = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for hyperparameters: {e}"
+                        )
                     });
                 self
             }
@@ -8674,6 +9518,7 @@ the same sites and the points around them.*/
                     alpha: value.alpha?,
                     cloud: value.cloud?,
                     duplicates: value.duplicates?,
+                    hyperparameters: value.hyperparameters?,
                     include: value.include?,
                     kernel: value.kernel?,
                     noise_variances: value.noise_variances?,
@@ -8691,6 +9536,7 @@ the same sites and the points around them.*/
                     alpha: Ok(value.alpha),
                     cloud: Ok(value.cloud),
                     duplicates: Ok(value.duplicates),
+                    hyperparameters: Ok(value.hyperparameters),
                     include: Ok(value.include),
                     kernel: Ok(value.kernel),
                     noise_variances: Ok(value.noise_variances),
@@ -10191,6 +11037,503 @@ the same sites and the points around them.*/
             }
         }
         #[derive(Clone, Debug)]
+        pub struct Region {
+            area: ::std::result::Result<f64, ::std::string::String>,
+            centre: ::std::result::Result<::std::vec::Vec<f64>, ::std::string::String>,
+            lower: ::std::result::Result<::std::vec::Vec<f64>, ::std::string::String>,
+            n_coarse: ::std::result::Result<u64, ::std::string::String>,
+            n_points: ::std::result::Result<u64, ::std::string::String>,
+            n_signed: ::std::result::Result<u64, ::std::string::String>,
+            normal: ::std::result::Result<::std::vec::Vec<f64>, ::std::string::String>,
+            spread: ::std::result::Result<f64, ::std::string::String>,
+            upper: ::std::result::Result<::std::vec::Vec<f64>, ::std::string::String>,
+            volume: ::std::result::Result<f64, ::std::string::String>,
+        }
+        impl ::std::default::Default for Region {
+            fn default() -> Self {
+                Self {
+                    area: Err("no value supplied for area".to_string()),
+                    centre: Err("no value supplied for centre".to_string()),
+                    lower: Err("no value supplied for lower".to_string()),
+                    n_coarse: Err("no value supplied for n_coarse".to_string()),
+                    n_points: Err("no value supplied for n_points".to_string()),
+                    n_signed: Err("no value supplied for n_signed".to_string()),
+                    normal: Err("no value supplied for normal".to_string()),
+                    spread: Err("no value supplied for spread".to_string()),
+                    upper: Err("no value supplied for upper".to_string()),
+                    volume: Err("no value supplied for volume".to_string()),
+                }
+            }
+        }
+        impl Region {
+            pub fn area<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<f64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.area = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for area: {e}")
+                    });
+                self
+            }
+            pub fn centre<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.centre = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for centre: {e}")
+                    });
+                self
+            }
+            pub fn lower<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.lower = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for lower: {e}")
+                    });
+                self
+            }
+            pub fn n_coarse<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<u64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.n_coarse = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for n_coarse: {e}")
+                    });
+                self
+            }
+            pub fn n_points<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<u64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.n_points = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for n_points: {e}")
+                    });
+                self
+            }
+            pub fn n_signed<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<u64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.n_signed = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for n_signed: {e}")
+                    });
+                self
+            }
+            pub fn normal<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.normal = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for normal: {e}")
+                    });
+                self
+            }
+            pub fn spread<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<f64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.spread = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for spread: {e}")
+                    });
+                self
+            }
+            pub fn upper<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.upper = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for upper: {e}")
+                    });
+                self
+            }
+            pub fn volume<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<f64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.volume = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for volume: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<Region> for super::Region {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: Region,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    area: value.area?,
+                    centre: value.centre?,
+                    lower: value.lower?,
+                    n_coarse: value.n_coarse?,
+                    n_points: value.n_points?,
+                    n_signed: value.n_signed?,
+                    normal: value.normal?,
+                    spread: value.spread?,
+                    upper: value.upper?,
+                    volume: value.volume?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::Region> for Region {
+            fn from(value: super::Region) -> Self {
+                Self {
+                    area: Ok(value.area),
+                    centre: Ok(value.centre),
+                    lower: Ok(value.lower),
+                    n_coarse: Ok(value.n_coarse),
+                    n_points: Ok(value.n_points),
+                    n_signed: Ok(value.n_signed),
+                    normal: Ok(value.normal),
+                    spread: Ok(value.spread),
+                    upper: Ok(value.upper),
+                    volume: Ok(value.volume),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct RegionsRequest {
+            alpha: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
+            cloud: ::std::result::Result<super::CloudRef, ::std::string::String>,
+            coarse: ::std::result::Result<::std::vec::Vec<u64>, ::std::string::String>,
+            duplicates: ::std::result::Result<
+                ::std::option::Option<super::DuplicatePolicy>,
+                ::std::string::String,
+            >,
+            hyperparameters: ::std::result::Result<
+                ::std::option::Option<super::Hyperparameters>,
+                ::std::string::String,
+            >,
+            kernel: ::std::result::Result<
+                ::std::option::Option<super::Kernel>,
+                ::std::string::String,
+            >,
+            noise_variances: ::std::result::Result<
+                ::std::vec::Vec<f64>,
+                ::std::string::String,
+            >,
+            own: ::std::result::Result<::std::vec::Vec<u64>, ::std::string::String>,
+            solver: ::std::result::Result<
+                ::std::option::Option<super::SolverChoice>,
+                ::std::string::String,
+            >,
+        }
+        impl ::std::default::Default for RegionsRequest {
+            fn default() -> Self {
+                Self {
+                    alpha: Ok(Default::default()),
+                    cloud: Err("no value supplied for cloud".to_string()),
+                    coarse: Ok(Default::default()),
+                    duplicates: Ok(Default::default()),
+                    hyperparameters: Ok(Default::default()),
+                    kernel: Ok(Default::default()),
+                    noise_variances: Ok(Default::default()),
+                    own: Err("no value supplied for own".to_string()),
+                    solver: Ok(Default::default()),
+                }
+            }
+        }
+        impl RegionsRequest {
+            pub fn alpha<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.alpha = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for alpha: {e}")
+                    });
+                self
+            }
+            pub fn cloud<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::CloudRef>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.cloud = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for cloud: {e}")
+                    });
+                self
+            }
+            pub fn coarse<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<u64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.coarse = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for coarse: {e}")
+                    });
+                self
+            }
+            pub fn duplicates<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<super::DuplicatePolicy>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.duplicates = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for duplicates: {e}")
+                    });
+                self
+            }
+            pub fn hyperparameters<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<super::Hyperparameters>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.hyperparameters = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for hyperparameters: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn kernel<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::Kernel>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.kernel = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for kernel: {e}")
+                    });
+                self
+            }
+            pub fn noise_variances<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.noise_variances = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for noise_variances: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn own<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<u64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.own = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for own: {e}")
+                    });
+                self
+            }
+            pub fn solver<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::SolverChoice>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.solver = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for solver: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<RegionsRequest> for super::RegionsRequest {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: RegionsRequest,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    alpha: value.alpha?,
+                    cloud: value.cloud?,
+                    coarse: value.coarse?,
+                    duplicates: value.duplicates?,
+                    hyperparameters: value.hyperparameters?,
+                    kernel: value.kernel?,
+                    noise_variances: value.noise_variances?,
+                    own: value.own?,
+                    solver: value.solver?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::RegionsRequest> for RegionsRequest {
+            fn from(value: super::RegionsRequest) -> Self {
+                Self {
+                    alpha: Ok(value.alpha),
+                    cloud: Ok(value.cloud),
+                    coarse: Ok(value.coarse),
+                    duplicates: Ok(value.duplicates),
+                    hyperparameters: Ok(value.hyperparameters),
+                    kernel: Ok(value.kernel),
+                    noise_variances: Ok(value.noise_variances),
+                    own: Ok(value.own),
+                    solver: Ok(value.solver),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct RegionsResponse {
+            borders: ::std::result::Result<
+                ::std::vec::Vec<super::Border>,
+                ::std::string::String,
+            >,
+            diagnostics: ::std::result::Result<
+                super::Diagnostics,
+                ::std::string::String,
+            >,
+            labels: ::std::result::Result<::std::vec::Vec<i64>, ::std::string::String>,
+            n_edges: ::std::result::Result<u64, ::std::string::String>,
+            regions: ::std::result::Result<
+                ::std::vec::Vec<super::Region>,
+                ::std::string::String,
+            >,
+        }
+        impl ::std::default::Default for RegionsResponse {
+            fn default() -> Self {
+                Self {
+                    borders: Err("no value supplied for borders".to_string()),
+                    diagnostics: Err("no value supplied for diagnostics".to_string()),
+                    labels: Err("no value supplied for labels".to_string()),
+                    n_edges: Err("no value supplied for n_edges".to_string()),
+                    regions: Err("no value supplied for regions".to_string()),
+                }
+            }
+        }
+        impl RegionsResponse {
+            pub fn borders<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::Border>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.borders = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for borders: {e}")
+                    });
+                self
+            }
+            pub fn diagnostics<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::Diagnostics>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.diagnostics = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for diagnostics: {e}")
+                    });
+                self
+            }
+            pub fn labels<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<i64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.labels = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for labels: {e}")
+                    });
+                self
+            }
+            pub fn n_edges<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<u64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.n_edges = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for n_edges: {e}")
+                    });
+                self
+            }
+            pub fn regions<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::Region>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.regions = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for regions: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<RegionsResponse> for super::RegionsResponse {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: RegionsResponse,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    borders: value.borders?,
+                    diagnostics: value.diagnostics?,
+                    labels: value.labels?,
+                    n_edges: value.n_edges?,
+                    regions: value.regions?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::RegionsResponse> for RegionsResponse {
+            fn from(value: super::RegionsResponse) -> Self {
+                Self {
+                    borders: Ok(value.borders),
+                    diagnostics: Ok(value.diagnostics),
+                    labels: Ok(value.labels),
+                    n_edges: Ok(value.n_edges),
+                    regions: Ok(value.regions),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
         pub struct Samples {
             count: ::std::result::Result<::std::num::NonZeroU64, ::std::string::String>,
             seed: ::std::result::Result<
@@ -10248,6 +11591,131 @@ the same sites and the points around them.*/
                 Self {
                     count: Ok(value.count),
                     seed: Ok(value.seed),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct SidesRequest {
+            links: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<u64>>,
+                ::std::string::String,
+            >,
+            tiles: ::std::result::Result<
+                ::std::vec::Vec<super::TileRegions>,
+                ::std::string::String,
+            >,
+        }
+        impl ::std::default::Default for SidesRequest {
+            fn default() -> Self {
+                Self {
+                    links: Err("no value supplied for links".to_string()),
+                    tiles: Err("no value supplied for tiles".to_string()),
+                }
+            }
+        }
+        impl SidesRequest {
+            pub fn links<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<u64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.links = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for links: {e}")
+                    });
+                self
+            }
+            pub fn tiles<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::TileRegions>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.tiles = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for tiles: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<SidesRequest> for super::SidesRequest {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: SidesRequest,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    links: value.links?,
+                    tiles: value.tiles?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::SidesRequest> for SidesRequest {
+            fn from(value: super::SidesRequest) -> Self {
+                Self {
+                    links: Ok(value.links),
+                    tiles: Ok(value.tiles),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct SidesResponse {
+            are_doubtful: ::std::result::Result<
+                ::std::vec::Vec<bool>,
+                ::std::string::String,
+            >,
+            signs: ::std::result::Result<::std::vec::Vec<i32>, ::std::string::String>,
+        }
+        impl ::std::default::Default for SidesResponse {
+            fn default() -> Self {
+                Self {
+                    are_doubtful: Err("no value supplied for are_doubtful".to_string()),
+                    signs: Err("no value supplied for signs".to_string()),
+                }
+            }
+        }
+        impl SidesResponse {
+            pub fn are_doubtful<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<bool>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.are_doubtful = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for are_doubtful: {e}")
+                    });
+                self
+            }
+            pub fn signs<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<i32>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.signs = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for signs: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<SidesResponse> for super::SidesResponse {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: SidesResponse,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    are_doubtful: value.are_doubtful?,
+                    signs: value.signs?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::SidesResponse> for SidesResponse {
+            fn from(value: super::SidesResponse) -> Self {
+                Self {
+                    are_doubtful: Ok(value.are_doubtful),
+                    signs: Ok(value.signs),
                 }
             }
         }
@@ -10446,6 +11914,10 @@ the same sites and the points around them.*/
                 ::std::option::Option<super::Geometry>,
                 ::std::string::String,
             >,
+            hyperparameters: ::std::result::Result<
+                ::std::option::Option<super::Hyperparameters>,
+                ::std::string::String,
+            >,
             kernel: ::std::result::Result<
                 ::std::option::Option<super::Kernel>,
                 ::std::string::String,
@@ -10474,6 +11946,7 @@ the same sites and the points around them.*/
                     cloud: Err("no value supplied for cloud".to_string()),
                     duplicates: Ok(Default::default()),
                     geometry: Ok(Default::default()),
+                    hyperparameters: Ok(Default::default()),
                     kernel: Ok(Default::default()),
                     mean: Ok(Default::default()),
                     noise_variances: Ok(Default::default()),
@@ -10530,6 +12003,22 @@ the same sites and the points around them.*/
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for geometry: {e}")
+                    });
+                self
+            }
+            pub fn hyperparameters<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<super::Hyperparameters>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.hyperparameters = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for hyperparameters: {e}"
+                        )
                     });
                 self
             }
@@ -10607,6 +12096,7 @@ the same sites and the points around them.*/
                     cloud: value.cloud?,
                     duplicates: value.duplicates?,
                     geometry: value.geometry?,
+                    hyperparameters: value.hyperparameters?,
                     kernel: value.kernel?,
                     mean: value.mean?,
                     noise_variances: value.noise_variances?,
@@ -10623,6 +12113,7 @@ the same sites and the points around them.*/
                     cloud: Ok(value.cloud),
                     duplicates: Ok(value.duplicates),
                     geometry: Ok(value.geometry),
+                    hyperparameters: Ok(value.hyperparameters),
                     kernel: Ok(value.kernel),
                     mean: Ok(value.mean),
                     noise_variances: Ok(value.noise_variances),
@@ -10737,6 +12228,10 @@ the same sites and the points around them.*/
                 ::std::option::Option<super::Geometry>,
                 ::std::string::String,
             >,
+            hyperparameters: ::std::result::Result<
+                ::std::option::Option<super::Hyperparameters>,
+                ::std::string::String,
+            >,
             include: ::std::result::Result<
                 ::std::vec::Vec<super::ValuesInclude>,
                 ::std::string::String,
@@ -10770,6 +12265,7 @@ the same sites and the points around them.*/
                     cloud: Err("no value supplied for cloud".to_string()),
                     duplicates: Ok(Default::default()),
                     geometry: Ok(Default::default()),
+                    hyperparameters: Ok(Default::default()),
                     include: Ok(Default::default()),
                     kernel: Ok(Default::default()),
                     mean: Ok(Default::default()),
@@ -10828,6 +12324,22 @@ the same sites and the points around them.*/
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for geometry: {e}")
+                    });
+                self
+            }
+            pub fn hyperparameters<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<super::Hyperparameters>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.hyperparameters = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for hyperparameters: {e}"
+                        )
                     });
                 self
             }
@@ -10929,6 +12441,7 @@ the same sites and the points around them.*/
                     cloud: value.cloud?,
                     duplicates: value.duplicates?,
                     geometry: value.geometry?,
+                    hyperparameters: value.hyperparameters?,
                     include: value.include?,
                     kernel: value.kernel?,
                     mean: value.mean?,
@@ -10947,6 +12460,7 @@ the same sites and the points around them.*/
                     cloud: Ok(value.cloud),
                     duplicates: Ok(value.duplicates),
                     geometry: Ok(value.geometry),
+                    hyperparameters: Ok(value.hyperparameters),
                     include: Ok(value.include),
                     kernel: Ok(value.kernel),
                     mean: Ok(value.mean),
@@ -11082,6 +12596,10 @@ the same sites and the points around them.*/
                 ::std::option::Option<super::Geometry>,
                 ::std::string::String,
             >,
+            hyperparameters: ::std::result::Result<
+                ::std::option::Option<super::Hyperparameters>,
+                ::std::string::String,
+            >,
             kernel: ::std::result::Result<
                 ::std::option::Option<super::Kernel>,
                 ::std::string::String,
@@ -11091,10 +12609,6 @@ the same sites and the points around them.*/
                 ::std::string::String,
             >,
             queries: ::std::result::Result<
-                ::std::vec::Vec<::std::vec::Vec<f64>>,
-                ::std::string::String,
-            >,
-            sites: ::std::result::Result<
                 ::std::vec::Vec<::std::vec::Vec<f64>>,
                 ::std::string::String,
             >,
@@ -11110,10 +12624,10 @@ the same sites and the points around them.*/
                     cloud: Err("no value supplied for cloud".to_string()),
                     duplicates: Ok(Default::default()),
                     geometry: Ok(Default::default()),
+                    hyperparameters: Ok(Default::default()),
                     kernel: Ok(Default::default()),
                     noise_variances: Ok(Default::default()),
                     queries: Ok(Default::default()),
-                    sites: Ok(Default::default()),
                     solver: Ok(Default::default()),
                 }
             }
@@ -11169,6 +12683,22 @@ the same sites and the points around them.*/
                     });
                 self
             }
+            pub fn hyperparameters<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<super::Hyperparameters>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.hyperparameters = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for hyperparameters: {e}"
+                        )
+                    });
+                self
+            }
             pub fn kernel<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::option::Option<super::Kernel>>,
@@ -11207,18 +12737,6 @@ the same sites and the points around them.*/
                     });
                 self
             }
-            pub fn sites<T>(mut self, value: T) -> Self
-            where
-                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
-                T::Error: ::std::fmt::Display,
-            {
-                self.sites = value
-                    .try_into()
-                    .map_err(|e| {
-                        format!("error converting supplied value for sites: {e}")
-                    });
-                self
-            }
             pub fn solver<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::option::Option<super::SolverChoice>>,
@@ -11243,10 +12761,10 @@ the same sites and the points around them.*/
                     cloud: value.cloud?,
                     duplicates: value.duplicates?,
                     geometry: value.geometry?,
+                    hyperparameters: value.hyperparameters?,
                     kernel: value.kernel?,
                     noise_variances: value.noise_variances?,
                     queries: value.queries?,
-                    sites: value.sites?,
                     solver: value.solver?,
                 })
             }
@@ -11259,10 +12777,10 @@ the same sites and the points around them.*/
                     cloud: Ok(value.cloud),
                     duplicates: Ok(value.duplicates),
                     geometry: Ok(value.geometry),
+                    hyperparameters: Ok(value.hyperparameters),
                     kernel: Ok(value.kernel),
                     noise_variances: Ok(value.noise_variances),
                     queries: Ok(value.queries),
-                    sites: Ok(value.sites),
                     solver: Ok(value.solver),
                 }
             }
@@ -11397,6 +12915,86 @@ the same sites and the points around them.*/
                     indices: Ok(value.indices),
                     indptr: Ok(value.indptr),
                     shape: Ok(value.shape),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct TileRegions {
+            borders: ::std::result::Result<
+                ::std::vec::Vec<super::Border>,
+                ::std::string::String,
+            >,
+            n_edges: ::std::result::Result<u64, ::std::string::String>,
+            regions: ::std::result::Result<
+                ::std::vec::Vec<super::Region>,
+                ::std::string::String,
+            >,
+        }
+        impl ::std::default::Default for TileRegions {
+            fn default() -> Self {
+                Self {
+                    borders: Err("no value supplied for borders".to_string()),
+                    n_edges: Err("no value supplied for n_edges".to_string()),
+                    regions: Err("no value supplied for regions".to_string()),
+                }
+            }
+        }
+        impl TileRegions {
+            pub fn borders<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::Border>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.borders = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for borders: {e}")
+                    });
+                self
+            }
+            pub fn n_edges<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<u64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.n_edges = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for n_edges: {e}")
+                    });
+                self
+            }
+            pub fn regions<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::Region>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.regions = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for regions: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<TileRegions> for super::TileRegions {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: TileRegions,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    borders: value.borders?,
+                    n_edges: value.n_edges?,
+                    regions: value.regions?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::TileRegions> for TileRegions {
+            fn from(value: super::TileRegions) -> Self {
+                Self {
+                    borders: Ok(value.borders),
+                    n_edges: Ok(value.n_edges),
+                    regions: Ok(value.regions),
                 }
             }
         }
@@ -11927,6 +13525,55 @@ let response = client.select_model()
 ```*/
     pub fn select_model(&self) -> builder::SelectModel<'_> {
         builder::SelectModel::new(self)
+    }
+    /**Choose a coarse cloud
+
+Chooses points that are spread as the cloud is. Minus the gradient of the interpolant of the constant 1 at
+these points, with this kernel and alpha, points out of closed surfaces. Local regressions orient their
+normals by it. Tiles of a cloud orient theirs alike if they all take that of the whole cloud.
+
+Sends a `POST` request to `/v1/coarse`
+
+```ignore
+let response = client.choose_coarse_cloud()
+    .body(body)
+    .send()
+    .await;
+```*/
+    pub fn choose_coarse_cloud(&self) -> builder::ChooseCoarseCloud<'_> {
+        builder::ChooseCoarseCloud::new(self)
+    }
+    /**Find the regions of a tile
+
+Joins the points of a tile whose normals agree with those of their neighbours, and sums up what
+decides the side of each region. `POST /v1/sides` joins the regions of all tiles.
+
+Sends a `POST` request to `/v1/regions`
+
+```ignore
+let response = client.compute_regions()
+    .body(body)
+    .send()
+    .await;
+```*/
+    pub fn compute_regions(&self) -> builder::ComputeRegions<'_> {
+        builder::ComputeRegions::new(self)
+    }
+    /**Join the regions of tiles
+
+Chooses the sides of all regions together, by the rules for a whole cloud: regions are joined across their
+surest borders, and each connected piece has the side that its volume or its coarse cloud says.
+
+Sends a `POST` request to `/v1/sides`
+
+```ignore
+let response = client.choose_sides()
+    .body(body)
+    .send()
+    .await;
+```*/
+    pub fn choose_sides(&self) -> builder::ChooseSides<'_> {
+        builder::ChooseSides::new(self)
     }
     /**Compute normals
 
@@ -14088,6 +15735,500 @@ pub mod builder {
                 .build()?;
             let info = OperationInfo {
                 operation_id: "select_model",
+            };
+            client.pre(&mut request, &info).await?;
+            let result = client.exec(request, &info).await;
+            client.post(&result, &info).await?;
+            let response = result?;
+            match response.status().as_u16() {
+                200u16 => ResponseValue::from_response(response).await,
+                400u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                401u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                404u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                406u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                408u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                413u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                415u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                422u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                429u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                500u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                503u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                504u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                _ => Err(Error::UnexpectedResponse(response)),
+            }
+        }
+    }
+    /**Builder for [`Client::choose_coarse_cloud`]
+
+[`Client::choose_coarse_cloud`]: super::Client::choose_coarse_cloud*/
+    #[derive(Debug, Clone)]
+    pub struct ChooseCoarseCloud<'a> {
+        client: &'a super::Client,
+        body: Result<types::builder::CoarseRequest, String>,
+    }
+    impl<'a> ChooseCoarseCloud<'a> {
+        pub fn new(client: &'a super::Client) -> Self {
+            Self {
+                client: client,
+                body: Ok(::std::default::Default::default()),
+            }
+        }
+        pub fn body<V>(mut self, value: V) -> Self
+        where
+            V: std::convert::TryInto<types::CoarseRequest>,
+            <V as std::convert::TryInto<types::CoarseRequest>>::Error: std::fmt::Display,
+        {
+            self.body = value
+                .try_into()
+                .map(From::from)
+                .map_err(|s| {
+                    format!("conversion to `CoarseRequest` for body failed: {}", s)
+                });
+            self
+        }
+        pub fn body_map<F>(mut self, f: F) -> Self
+        where
+            F: std::ops::FnOnce(
+                types::builder::CoarseRequest,
+            ) -> types::builder::CoarseRequest,
+        {
+            self.body = self.body.map(f);
+            self
+        }
+        ///Sends a `POST` request to `/v1/coarse`
+        pub async fn send(
+            self,
+        ) -> Result<ResponseValue<types::CoarseResponse>, Error<types::Problem>> {
+            let Self { client, body } = self;
+            let body = body
+                .and_then(|v| {
+                    types::CoarseRequest::try_from(v).map_err(|e| e.to_string())
+                })
+                .map_err(Error::InvalidRequest)?;
+            let url = format!("{}/v1/coarse", client.baseurl,);
+            let mut header_map = ::reqwest::header::HeaderMap::with_capacity(1usize);
+            header_map
+                .append(
+                    ::reqwest::header::HeaderName::from_static("api-version"),
+                    ::reqwest::header::HeaderValue::from_static(
+                        super::Client::api_version(),
+                    ),
+                );
+            #[allow(unused_mut)]
+            let mut request = client
+                .client
+                .post(url)
+                .header(
+                    ::reqwest::header::ACCEPT,
+                    ::reqwest::header::HeaderValue::from_static("application/json"),
+                )
+                .json(&body)
+                .headers(header_map)
+                .build()?;
+            let info = OperationInfo {
+                operation_id: "choose_coarse_cloud",
+            };
+            client.pre(&mut request, &info).await?;
+            let result = client.exec(request, &info).await;
+            client.post(&result, &info).await?;
+            let response = result?;
+            match response.status().as_u16() {
+                200u16 => ResponseValue::from_response(response).await,
+                400u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                401u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                404u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                406u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                408u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                413u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                415u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                422u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                429u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                500u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                503u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                504u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                _ => Err(Error::UnexpectedResponse(response)),
+            }
+        }
+    }
+    /**Builder for [`Client::compute_regions`]
+
+[`Client::compute_regions`]: super::Client::compute_regions*/
+    #[derive(Debug, Clone)]
+    pub struct ComputeRegions<'a> {
+        client: &'a super::Client,
+        body: Result<types::builder::RegionsRequest, String>,
+    }
+    impl<'a> ComputeRegions<'a> {
+        pub fn new(client: &'a super::Client) -> Self {
+            Self {
+                client: client,
+                body: Ok(::std::default::Default::default()),
+            }
+        }
+        pub fn body<V>(mut self, value: V) -> Self
+        where
+            V: std::convert::TryInto<types::RegionsRequest>,
+            <V as std::convert::TryInto<
+                types::RegionsRequest,
+            >>::Error: std::fmt::Display,
+        {
+            self.body = value
+                .try_into()
+                .map(From::from)
+                .map_err(|s| {
+                    format!("conversion to `RegionsRequest` for body failed: {}", s)
+                });
+            self
+        }
+        pub fn body_map<F>(mut self, f: F) -> Self
+        where
+            F: std::ops::FnOnce(
+                types::builder::RegionsRequest,
+            ) -> types::builder::RegionsRequest,
+        {
+            self.body = self.body.map(f);
+            self
+        }
+        ///Sends a `POST` request to `/v1/regions`
+        pub async fn send(
+            self,
+        ) -> Result<ResponseValue<types::RegionsResponse>, Error<types::Problem>> {
+            let Self { client, body } = self;
+            let body = body
+                .and_then(|v| {
+                    types::RegionsRequest::try_from(v).map_err(|e| e.to_string())
+                })
+                .map_err(Error::InvalidRequest)?;
+            let url = format!("{}/v1/regions", client.baseurl,);
+            let mut header_map = ::reqwest::header::HeaderMap::with_capacity(1usize);
+            header_map
+                .append(
+                    ::reqwest::header::HeaderName::from_static("api-version"),
+                    ::reqwest::header::HeaderValue::from_static(
+                        super::Client::api_version(),
+                    ),
+                );
+            #[allow(unused_mut)]
+            let mut request = client
+                .client
+                .post(url)
+                .header(
+                    ::reqwest::header::ACCEPT,
+                    ::reqwest::header::HeaderValue::from_static("application/json"),
+                )
+                .json(&body)
+                .headers(header_map)
+                .build()?;
+            let info = OperationInfo {
+                operation_id: "compute_regions",
+            };
+            client.pre(&mut request, &info).await?;
+            let result = client.exec(request, &info).await;
+            client.post(&result, &info).await?;
+            let response = result?;
+            match response.status().as_u16() {
+                200u16 => ResponseValue::from_response(response).await,
+                400u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                401u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                404u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                406u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                408u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                413u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                415u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                422u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                429u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                500u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                503u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                504u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                _ => Err(Error::UnexpectedResponse(response)),
+            }
+        }
+    }
+    /**Builder for [`Client::choose_sides`]
+
+[`Client::choose_sides`]: super::Client::choose_sides*/
+    #[derive(Debug, Clone)]
+    pub struct ChooseSides<'a> {
+        client: &'a super::Client,
+        body: Result<types::builder::SidesRequest, String>,
+    }
+    impl<'a> ChooseSides<'a> {
+        pub fn new(client: &'a super::Client) -> Self {
+            Self {
+                client: client,
+                body: Ok(::std::default::Default::default()),
+            }
+        }
+        pub fn body<V>(mut self, value: V) -> Self
+        where
+            V: std::convert::TryInto<types::SidesRequest>,
+            <V as std::convert::TryInto<types::SidesRequest>>::Error: std::fmt::Display,
+        {
+            self.body = value
+                .try_into()
+                .map(From::from)
+                .map_err(|s| {
+                    format!("conversion to `SidesRequest` for body failed: {}", s)
+                });
+            self
+        }
+        pub fn body_map<F>(mut self, f: F) -> Self
+        where
+            F: std::ops::FnOnce(
+                types::builder::SidesRequest,
+            ) -> types::builder::SidesRequest,
+        {
+            self.body = self.body.map(f);
+            self
+        }
+        ///Sends a `POST` request to `/v1/sides`
+        pub async fn send(
+            self,
+        ) -> Result<ResponseValue<types::SidesResponse>, Error<types::Problem>> {
+            let Self { client, body } = self;
+            let body = body
+                .and_then(|v| {
+                    types::SidesRequest::try_from(v).map_err(|e| e.to_string())
+                })
+                .map_err(Error::InvalidRequest)?;
+            let url = format!("{}/v1/sides", client.baseurl,);
+            let mut header_map = ::reqwest::header::HeaderMap::with_capacity(1usize);
+            header_map
+                .append(
+                    ::reqwest::header::HeaderName::from_static("api-version"),
+                    ::reqwest::header::HeaderValue::from_static(
+                        super::Client::api_version(),
+                    ),
+                );
+            #[allow(unused_mut)]
+            let mut request = client
+                .client
+                .post(url)
+                .header(
+                    ::reqwest::header::ACCEPT,
+                    ::reqwest::header::HeaderValue::from_static("application/json"),
+                )
+                .json(&body)
+                .headers(header_map)
+                .build()?;
+            let info = OperationInfo {
+                operation_id: "choose_sides",
             };
             client.pre(&mut request, &info).await?;
             let result = client.exec(request, &info).await;
