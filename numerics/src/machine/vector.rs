@@ -2,11 +2,13 @@
 
 use super::small::Small;
 
+#[inline]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Returns `√Σv²`. If the squares leave the range of float64, the components are scaled first.
+#[inline]
 pub(crate) fn norm(v: &[f64]) -> f64 {
     let squared = dot(v, v);
     if (f64::MIN_POSITIVE / f64::EPSILON..f64::INFINITY).contains(&squared) {

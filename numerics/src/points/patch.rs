@@ -143,14 +143,18 @@ const RIM_LEAST: f64 = 0.01;
 /// `tangential` are the coordinates of the neighbours over the tangent plane, `[k]` each, in units of their
 /// radius. In the plane a rim is an empty sector of 150°. Inside a uniformly random cloud it occurs at 0.2 %
 /// of the points, at a straight rim at nearly all of them.
-pub(crate) fn is_at_rim<'a>(tangential: impl Iterator<Item = &'a [f64]> + Clone, k: usize) -> bool {
+#[inline]
+pub(crate) fn is_at_rim<'a>(mut tangential: impl Iterator<Item = &'a [f64]> + Clone, k: usize) -> bool {
     let mut away = zeros(k);
     for t in tangential.clone() {
         away.iter_mut().zip(t).for_each(|(a, t)| *a -= t);
     }
     let length = norm(&away);
-    let mut directed = tangential.filter(|t| norm(t) > RIM_LEAST);
-    length > 0.0 && directed.all(|t| dot(t, &away) < RIM_COSINE * length * norm(t))
+    let is_elsewhere = |t: &[f64]| {
+        let distance = norm(t);
+        distance <= RIM_LEAST || dot(t, &away) < RIM_COSINE * length * distance
+    };
+    length > 0.0 && tangential.all(is_elsewhere)
 }
 
 /// Replaces vectors `[k, d]` by their components along the axes of a frame `[d, d]`.

@@ -36,28 +36,37 @@ impl<S: Simd> Lower<'_, S> {
         for column in (0..n).step_by(COLUMNS) {
             // The triangle on the diagonal, row by row.
             self.tiles::<1, COLUMNS>(column..column + COLUMNS, column, rounding);
-            self.tiles::<ROWS, COLUMNS>(column + COLUMNS..n, column, rounding);
-            self.tiles::<ROWS, COLUMNS>(below.clone(), column, rounding);
+            self.rows::<ROWS, COLUMNS>(column + COLUMNS..n, column, rounding);
+            self.rows::<ROWS, COLUMNS>(below.clone(), column, rounding);
         }
     }
 
-    /// Computes a range of rows in the columns from `column` on.
+    /// Computes a range of rows in the columns from `column` on, the last few in pairs and alone.
     #[inline(always)]
-    fn tiles<const ROWS: usize, const COLUMNS: usize>(
+    fn rows<const ROWS: usize, const COLUMNS: usize>(
         &mut self,
         rows: Range<usize>,
         column: usize,
         rounding: &impl Rounding<S>,
     ) {
-        let mut i = rows.start;
-        while i + ROWS <= rows.end {
-            self.tile::<ROWS, COLUMNS>(i, column, rounding);
-            i += ROWS;
+        let rest = self.tiles::<ROWS, COLUMNS>(rows, column, rounding);
+        let rest = self.tiles::<2, COLUMNS>(rest, column, rounding);
+        self.tiles::<1, COLUMNS>(rest, column, rounding);
+    }
+
+    /// Computes all tiles of `ROWS` rows in a range and returns the rows that are left.
+    #[inline(always)]
+    fn tiles<const ROWS: usize, const COLUMNS: usize>(
+        &mut self,
+        mut rows: Range<usize>,
+        column: usize,
+        rounding: &impl Rounding<S>,
+    ) -> Range<usize> {
+        while rows.len() >= ROWS {
+            self.tile::<ROWS, COLUMNS>(rows.start, column, rounding);
+            rows.start += ROWS;
         }
-        while i < rows.end {
-            self.tile::<1, COLUMNS>(i, column, rounding);
-            i += 1;
-        }
+        rows
     }
 
     /// Computes `ROWS` rows from i on in the columns from `column` on. All columns before must be done.

@@ -40,7 +40,7 @@ const LEAST_CURVATURE: f64 = 1e-7;
 /// if no solver would serve the start.
 ///
 /// # Errors
-/// `NumericsError::Cancelled`, and the errors of [`Hyperparameters::kernel_on`].
+/// `NumericsError::Cancelled`, and the errors of [`Evaluator::score`].
 pub(super) fn descend(
     evaluator: &mut Evaluator<'_>,
     space: &Space,
