@@ -30,9 +30,6 @@ from .cells.plan import Plan, nearest_to
 PROBE_POINTS = 60_000
 """Most points of the cloud from which tiles learn. A smaller cloud is learned from as a whole."""
 
-DIMENSIONS = (2, 3, 4)
-"""Dimensions that have local regressions."""
-
 
 @dataclass(frozen=True)
 class Whole:
@@ -166,7 +163,7 @@ class SurfaceTiles:
         ValueError
             If the dimension is not 2, 3 or 4.
         """
-        if plan.dimension not in DIMENSIONS:
+        if plan.dimension not in (2, 3, 4):
             raise ValueError(f"surfaces in tiles have 2, 3 or 4 coordinates, not {plan.dimension}")
         whole = Whole.learned(replicas, plan, points)
         cores = graph.cores(points, plan)
