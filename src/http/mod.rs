@@ -87,6 +87,8 @@ fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
         .routes(routes!(clouds::get_cloud, clouds::check_cloud, clouds::delete_cloud))
         .routes(routes!(kernels::list_kernels))
         .routes(routes!(estimate::estimate))
+        .routes(routes!(coarse::choose_coarse_cloud))
+        .routes(routes!(sides::choose_sides))
         .routes(routes!(job_routes::get_job, job_routes::delete_job))
         .layer(from_fn(middleware::negotiate))
         // The routes below compute or return computed results, and negotiate formats themselves.
@@ -97,9 +99,7 @@ fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
         .routes(routes!(posterior::compute_posterior))
         .routes(routes!(posterior::compute_posterior_batch))
         .routes(routes!(model_selection::select_model))
-        .routes(routes!(coarse::choose_coarse_cloud))
         .routes(routes!(regions::compute_regions))
-        .routes(routes!(sides::choose_sides))
         .routes(routes!(normals::compute_normals))
         .routes(routes!(curvatures::compute_curvatures))
         .routes(routes!(surface_gradient::compute_surface_gradient))

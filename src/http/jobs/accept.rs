@@ -38,7 +38,7 @@ static MEANT_HEADERS: [HeaderName; 4] =
 const TRACE: &str = "traceparent";
 
 /// Routes that ignore the preference, because their work takes no longer than receiving the body.
-const AT_ONCE: [&str; 2] = ["/v1/clouds", "/v1/estimate"];
+const AT_ONCE: [&str; 4] = ["/v1/clouds", "/v1/estimate", "/v1/coarse", "/v1/sides"];
 
 /// Answers 202 to a POST that prefers so, and computes its answer in the background.
 pub async fn respond_async(State(runner): State<Runner>, request: Request, next: Next) -> Response {
