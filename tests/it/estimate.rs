@@ -20,7 +20,8 @@ fn operations() -> Vec<(String, String)> {
     let named = |(path, item): (&String, &Value)| {
         let operation = item.get("post")?;
         let id = operation["operationId"].as_str()?;
-        (operation.get("requestBody").is_some() && !["create_cloud", "estimate"].contains(&id))
+        let needs_none = ["create_cloud", "estimate", "choose_coarse_cloud", "choose_sides"];
+        (operation.get("requestBody").is_some() && !needs_none.contains(&id))
             .then(|| (id.to_owned(), path.clone()))
     };
     document["paths"].as_object().unwrap().iter().filter_map(named).collect()
@@ -29,6 +30,10 @@ fn operations() -> Vec<(String, String)> {
 /// Returns a request of an operation over a sphere of `n` points. Each `shift` gives a different cloud.
 fn request(path: &str, n: usize, shift: f64) -> Value {
     let points: Vec<_> = fibonacci_sphere(n).iter().map(|x| [x[0] + shift, x[1], x[2]]).collect();
+    if path.ends_with("regions") {
+        let cloud = json!({"points": points, "normals": fibonacci_sphere(n)});
+        return json!({"cloud": cloud, "own": (0..n).collect::<Vec<_>>()});
+    }
     let queries = points[..n / 4].to_vec();
     let values: Vec<f64> = points.iter().map(|x| (2.0 * x[1]).sin() + x[2]).collect();
     let mut request = json!({"cloud": {"points": points}, "queries": queries});
