@@ -109,6 +109,9 @@ async fn what_generated_clients_accept_is_acceptable() {
     let mut named = bodies["/v1/normals"].clone();
     named["operation"] = json!("compute_normals");
     bodies.insert("/v1/estimate", named);
+    bodies.insert("/v1/sides", json!({"tiles": [], "links": []}));
+    let tile = json!({"points": [[1, 0], [0, 1]], "normals": [[1, 0], [0, 1]]});
+    bodies.insert("/v1/regions", json!({"cloud": tile, "own": [0]}));
     for (name, document) in
         [("3.1", gramian::http::openapi_json()), ("3.0", gramian::http::OPENAPI_3_0.to_owned())]
     {
