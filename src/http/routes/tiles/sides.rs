@@ -24,7 +24,6 @@ use gramian_numerics::surface::tiles::{self, Tiling};
 #[serde(deny_unknown_fields)]
 pub struct SidesRequest {
     /// The regions of each tile, as `POST /v1/regions` answers them.
-    #[schema(min_items = 1)]
     pub tiles: Vec<TileRegions>,
     /// Pairs of regions that have a point in common, counted on from one tile to the next.
     pub links: Vec<[usize; 2]>,
