@@ -158,6 +158,9 @@ fn request_in(path: &str, n: usize, d: usize) -> Value {
     let outside = |x: &Vec<f64>| x.iter().map(|c| 1.01 * c).collect::<Vec<_>>();
     let mut request = request(path, n, 0.0);
     request["cloud"] = json!({"points": points});
+    if path.ends_with("regions") {
+        request["cloud"]["normals"] = json!(points);
+    }
     if request.get("queries").is_some() {
         request["queries"] = json!(points[..n / 4].iter().map(outside).collect::<Vec<_>>());
     }
@@ -212,7 +215,8 @@ async fn seconds_are_within_a_factor_of_two_in_the_median_over_routes_dimensions
     let mut ratios = Vec::new();
     // The first round only calibrates the speed of the machine.
     for (round, d) in [3].into_iter().chain(DIMENSIONS).enumerate() {
-        for (id, path) in operations().iter().filter(|(_, path)| d <= 4 || !path.ends_with("sparse-matrix")) {
+        let is_local = |path: &str| path.ends_with("sparse-matrix") || path.ends_with("regions");
+        for (id, path) in operations().iter().filter(|(_, path)| d <= 4 || !is_local(path)) {
             let plain = request_in(path, 240 - usize::from(round == 0), d);
             let extended = variants(&document, path).into_iter().map(|extra| {
                 let mut request = plain.clone();

@@ -99,7 +99,7 @@ async fn a_sphere_in_two_tiles_is_turned_outward() {
             tiles.push(Value::Object(members.into_iter().collect()));
         }
         assert_eq!(shared, [true, true]);
-        let body = json!({"tiles": tiles, "links": [[0, 1]]});
+        let body = json!({"tiles": tiles, "links": [{"first": 0, "second": 1}]});
         let sides = server.post("/v1/sides", &body).await.expect_ok();
         assert_eq!(sides, json!({"signs": [side as i8, side as i8], "are_doubtful": [false, false]}));
     }
@@ -116,9 +116,10 @@ async fn tiles_that_cannot_be_are_refused_by_their_place() {
         "normal": [1.0, 0.0], "volume": 0.0, "lower": [0.0, 0.0], "upper": [0.0, 0.0],
     });
     let tile = |border: usize| {
-        let borders = json!([{"regions": [0, border], "agreeing": 1.0, "opposing": 0.0}]);
+        let borders = json!([{"first": 0, "second": border, "agreeing": 1.0, "opposing": 0.0}]);
         json!({"regions": [region], "borders": borders, "n_edges": 6})
     };
+    let link = |second: usize| json!({"first": 0, "second": second});
     let cases = [
         ("/v1/regions", json!({"cloud": bare, "own": [0]}), "/cloud/normals"),
         ("/v1/regions", json!({"cloud": cloud, "own": [1, 1]}), "/own/1"),
@@ -126,7 +127,7 @@ async fn tiles_that_cannot_be_are_refused_by_their_place() {
         ("/v1/coarse", json!({"points": points, "count": 0}), "/count"),
         ("/v1/coarse", json!({"points": points, "noise_deviation": -1.0}), "/noise_deviation"),
         ("/v1/sides", json!({"tiles": [tile(0), tile(1)], "links": []}), "/tiles/1"),
-        ("/v1/sides", json!({"tiles": [tile(0), tile(0)], "links": [[0, 1], [0, 2]]}), "/links/1"),
+        ("/v1/sides", json!({"tiles": [tile(0), tile(0)], "links": [link(1), link(2)]}), "/links/1"),
     ];
     for (path, body, pointer) in cases {
         let problem = server.post(path, &body).await.expect_problem(422, "invalid-request");

@@ -37,9 +37,10 @@ pub struct Region {
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Border {
-    /// The positions of the two regions among those of the tile.
-    #[schema(min_items = 2, max_items = 2)]
-    pub regions: [usize; 2],
+    /// The position of one of the two regions among those of the tile.
+    pub first: usize,
+    /// The position of the other one.
+    pub second: usize,
     /// The weight of the edges across which the normals agree.
     pub agreeing: f64,
     /// The weight of the edges across which the normals are opposite.
@@ -63,13 +64,13 @@ impl From<Region> for tiles::Region {
 }
 
 impl From<tiles::Border> for Border {
-    fn from(tiles::Border { regions, agreeing, opposing }: tiles::Border) -> Self {
-        Self { regions, agreeing, opposing }
+    fn from(tiles::Border { regions: [first, second], agreeing, opposing }: tiles::Border) -> Self {
+        Self { first, second, agreeing, opposing }
     }
 }
 
 impl From<Border> for tiles::Border {
-    fn from(Border { regions, agreeing, opposing }: Border) -> Self {
-        Self { regions, agreeing, opposing }
+    fn from(Border { first, second, agreeing, opposing }: Border) -> Self {
+        Self { regions: [first, second], agreeing, opposing }
     }
 }

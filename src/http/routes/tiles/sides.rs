@@ -26,7 +26,17 @@ pub struct SidesRequest {
     /// The regions of each tile, as `POST /v1/regions` answers them.
     pub tiles: Vec<TileRegions>,
     /// Pairs of regions that have a point in common, counted on from one tile to the next.
-    pub links: Vec<[usize; 2]>,
+    pub links: Vec<Link>,
+}
+
+/// Two regions that have a point in common.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Link {
+    /// The position of one of them among the regions of all tiles.
+    pub first: usize,
+    /// The position of the other one.
+    pub second: usize,
 }
 
 /// The regions of a tile.
@@ -83,7 +93,8 @@ impl Direct for SidesRequest {
     fn compute(self, _: &Planner<'_>, _: &JobObserver) -> Result<SidesResponse, Problem> {
         let tiles: Vec<tiles::TileRegions> = self.tiles.into_iter().map(TileRegions::into).collect();
         let refuse = |error| Problem::from_numerics(error, Pointers::REQUEST);
-        let sides = Tiling::of(&tiles, &self.links).map_err(refuse)?.sides();
+        let links: Vec<[usize; 2]> = self.links.iter().map(|link| [link.first, link.second]).collect();
+        let sides = Tiling::of(&tiles, &links).map_err(refuse)?.sides();
         Ok(SidesResponse {
             signs: sides.iter().map(|side| if side.sign < 0.0 { -1 } else { 1 }).collect(),
             are_doubtful: sides.iter().map(|side| side.is_doubtful).collect(),
