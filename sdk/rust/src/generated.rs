@@ -13,10 +13,12 @@ pub mod types {
     pub struct Border {
         ///The weight of the edges across which the normals agree.
         pub agreeing: f64,
+        ///The position of one of the two regions among those of the tile.
+        pub first: u64,
         ///The weight of the edges across which the normals are opposite.
         pub opposing: f64,
-        ///The positions of the two regions among those of the tile.
-        pub regions: [u64; 2usize],
+        ///The position of the other one.
+        pub second: u64,
     }
     impl Border {
         pub fn builder() -> builder::Border {
@@ -1641,6 +1643,20 @@ In Python: `scipy.sparse.csr_matrix((data, indices, indptr), shape)`.*/
             Default::default()
         }
     }
+    ///Two regions that have a point in common.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    #[serde(deny_unknown_fields)]
+    pub struct Link {
+        ///The position of one of them among the regions of all tiles.
+        pub first: u64,
+        ///The position of the other one.
+        pub second: u64,
+    }
+    impl Link {
+        pub fn builder() -> builder::Link {
+            Default::default()
+        }
+    }
     ///The layout of a matrix.
     #[derive(
         ::serde::Deserialize,
@@ -2706,7 +2722,7 @@ smaller one.*/
     #[serde(deny_unknown_fields)]
     pub struct SidesRequest {
         ///Pairs of regions that have a point in common, counted on from one tile to the next.
-        pub links: ::std::vec::Vec<::std::vec::Vec<u64>>,
+        pub links: ::std::vec::Vec<Link>,
         ///The regions of each tile, as `POST /v1/regions` answers them.
         pub tiles: ::std::vec::Vec<TileRegions>,
     }
@@ -3457,15 +3473,17 @@ mean. The diagnostics repeat all of it.*/
         #[derive(Clone, Debug)]
         pub struct Border {
             agreeing: ::std::result::Result<f64, ::std::string::String>,
+            first: ::std::result::Result<u64, ::std::string::String>,
             opposing: ::std::result::Result<f64, ::std::string::String>,
-            regions: ::std::result::Result<[u64; 2usize], ::std::string::String>,
+            second: ::std::result::Result<u64, ::std::string::String>,
         }
         impl ::std::default::Default for Border {
             fn default() -> Self {
                 Self {
                     agreeing: Err("no value supplied for agreeing".to_string()),
+                    first: Err("no value supplied for first".to_string()),
                     opposing: Err("no value supplied for opposing".to_string()),
-                    regions: Err("no value supplied for regions".to_string()),
+                    second: Err("no value supplied for second".to_string()),
                 }
             }
         }
@@ -3482,6 +3500,18 @@ mean. The diagnostics repeat all of it.*/
                     });
                 self
             }
+            pub fn first<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<u64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.first = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for first: {e}")
+                    });
+                self
+            }
             pub fn opposing<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<f64>,
@@ -3494,15 +3524,15 @@ mean. The diagnostics repeat all of it.*/
                     });
                 self
             }
-            pub fn regions<T>(mut self, value: T) -> Self
+            pub fn second<T>(mut self, value: T) -> Self
             where
-                T: ::std::convert::TryInto<[u64; 2usize]>,
+                T: ::std::convert::TryInto<u64>,
                 T::Error: ::std::fmt::Display,
             {
-                self.regions = value
+                self.second = value
                     .try_into()
                     .map_err(|e| {
-                        format!("error converting supplied value for regions: {e}")
+                        format!("error converting supplied value for second: {e}")
                     });
                 self
             }
@@ -3514,8 +3544,9 @@ mean. The diagnostics repeat all of it.*/
             ) -> ::std::result::Result<Self, super::error::ConversionError> {
                 Ok(Self {
                     agreeing: value.agreeing?,
+                    first: value.first?,
                     opposing: value.opposing?,
-                    regions: value.regions?,
+                    second: value.second?,
                 })
             }
         }
@@ -3523,8 +3554,9 @@ mean. The diagnostics repeat all of it.*/
             fn from(value: super::Border) -> Self {
                 Self {
                     agreeing: Ok(value.agreeing),
+                    first: Ok(value.first),
                     opposing: Ok(value.opposing),
-                    regions: Ok(value.regions),
+                    second: Ok(value.second),
                 }
             }
         }
@@ -8729,6 +8761,64 @@ mean. The diagnostics repeat all of it.*/
             }
         }
         #[derive(Clone, Debug)]
+        pub struct Link {
+            first: ::std::result::Result<u64, ::std::string::String>,
+            second: ::std::result::Result<u64, ::std::string::String>,
+        }
+        impl ::std::default::Default for Link {
+            fn default() -> Self {
+                Self {
+                    first: Err("no value supplied for first".to_string()),
+                    second: Err("no value supplied for second".to_string()),
+                }
+            }
+        }
+        impl Link {
+            pub fn first<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<u64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.first = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for first: {e}")
+                    });
+                self
+            }
+            pub fn second<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<u64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.second = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for second: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<Link> for super::Link {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: Link,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    first: value.first?,
+                    second: value.second?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::Link> for Link {
+            fn from(value: super::Link) -> Self {
+                Self {
+                    first: Ok(value.first),
+                    second: Ok(value.second),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
         pub struct ModelSelectionRequest {
             alpha: ::std::result::Result<
                 ::std::option::Option<f64>,
@@ -11597,7 +11687,7 @@ mean. The diagnostics repeat all of it.*/
         #[derive(Clone, Debug)]
         pub struct SidesRequest {
             links: ::std::result::Result<
-                ::std::vec::Vec<::std::vec::Vec<u64>>,
+                ::std::vec::Vec<super::Link>,
                 ::std::string::String,
             >,
             tiles: ::std::result::Result<
@@ -11616,7 +11706,7 @@ mean. The diagnostics repeat all of it.*/
         impl SidesRequest {
             pub fn links<T>(mut self, value: T) -> Self
             where
-                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<u64>>>,
+                T: ::std::convert::TryInto<::std::vec::Vec<super::Link>>,
                 T::Error: ::std::fmt::Display,
             {
                 self.links = value

@@ -44,6 +44,7 @@ from .laplace_beltrami_response import LaplaceBeltramiResponse
 from .laplace_beltrami_sparse_matrix_request import LaplaceBeltramiSparseMatrixRequest
 from .laplace_beltrami_sparse_matrix_response import LaplaceBeltramiSparseMatrixResponse
 from .left_out import LeftOut
+from .link import Link
 from .matrix_format import MatrixFormat
 from .mean_choice import MeanChoice
 from .model_selection_request import ModelSelectionRequest
@@ -132,6 +133,7 @@ __all__ = (
     "LaplaceBeltramiSparseMatrixRequest",
     "LaplaceBeltramiSparseMatrixResponse",
     "LeftOut",
+    "Link",
     "MatrixFormat",
     "MeanChoice",
     "ModelSelectionRequest",

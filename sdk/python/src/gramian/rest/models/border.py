@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Self, TypeVar, cast
+from typing import Any, Self, TypeVar
 
 from attrs import define as _attrs_define
 
@@ -15,19 +15,23 @@ class Border:
     """What the edges between two regions say, or those within one.
 
     Attributes:
-        regions (list[int]): The positions of the two regions among those of the tile.
+        first (int): The position of one of the two regions among those of the tile.
+        second (int): The position of the other one.
         agreeing (float): The weight of the edges across which the normals agree.
         opposing (float): The weight of the edges across which the normals are opposite.
     """
 
-    regions: list[int]
+    first: int
+    second: int
     agreeing: float
     opposing: float
 
     __repr__ = without_unset
 
     def to_dict(self) -> dict[str, Any]:
-        regions = self.regions
+        first = self.first
+
+        second = self.second
 
         agreeing = self.agreeing
 
@@ -37,7 +41,8 @@ class Border:
 
         field_dict.update(
             {
-                "regions": regions,
+                "first": first,
+                "second": second,
                 "agreeing": agreeing,
                 "opposing": opposing,
             }
@@ -48,14 +53,17 @@ class Border:
     @classmethod
     def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
         d = dict(src_dict)
-        regions = cast(list[int], d.pop("regions"))
+        first = d.pop("first")
+
+        second = d.pop("second")
 
         agreeing = d.pop("agreeing")
 
         opposing = d.pop("opposing")
 
         border = cls(
-            regions=regions,
+            first=first,
+            second=second,
             agreeing=agreeing,
             opposing=opposing,
         )

@@ -1,13 +1,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from attrs import define as _attrs_define
 
 from ..types import without_unset
 
 if TYPE_CHECKING:
+    from ..models.link import Link
     from ..models.tile_regions import TileRegions
 
 
@@ -20,11 +21,11 @@ class SidesRequest:
 
     Attributes:
         tiles (list[TileRegions]): The regions of each tile, as `POST /v1/regions` answers them.
-        links (list[list[int]]): Pairs of regions that have a point in common, counted on from one tile to the next.
+        links (list[Link]): Pairs of regions that have a point in common, counted on from one tile to the next.
     """
 
     tiles: list[TileRegions]
-    links: list[list[int]]
+    links: list[Link]
 
     __repr__ = without_unset
 
@@ -36,8 +37,7 @@ class SidesRequest:
 
         links = []
         for links_item_data in self.links:
-            links_item = links_item_data
-
+            links_item = links_item_data.to_dict()
             links.append(links_item)
 
         field_dict: dict[str, Any] = {}
@@ -53,6 +53,7 @@ class SidesRequest:
 
     @classmethod
     def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
+        from ..models.link import Link
         from ..models.tile_regions import TileRegions
 
         d = dict(src_dict)
@@ -66,7 +67,7 @@ class SidesRequest:
         links = []
         _links = d.pop("links")
         for links_item_data in _links:
-            links_item = cast(list[int], links_item_data)
+            links_item = Link.from_dict(links_item_data)
 
             links.append(links_item)
 
