@@ -47,6 +47,7 @@ def find_regions(
 def choose_sides(client: Client, tiles: list[dict[str, Any]], links: Integers) -> tuple[Array, Any]:
     """Chooses the sides of the regions of all tiles: signs, `[r]`, and whether they are doubtful, `[r]`."""
     connection = client._connection
-    response = connection.post("/v1/sides", {"tiles": tiles, "links": [{"first": a, "second": b} for a, b in links.tolist()]}, JSON)
+    pairs = [{"first": first, "second": second} for first, second in links.tolist()]
+    response = connection.post("/v1/sides", {"tiles": tiles, "links": pairs}, JSON)
     found = connection.read(SidesResponse.from_dict, response)
     return np.array(found.signs, dtype=np.float64), np.array(found.are_doubtful, dtype=bool)
