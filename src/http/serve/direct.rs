@@ -3,6 +3,8 @@
 use std::sync::Arc;
 
 use axum::extract::Request;
+use axum::http::header;
+use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -12,7 +14,7 @@ use super::planner::Planner;
 use crate::http::compute::{JobObserver, Work};
 use crate::http::problem::Problem;
 use crate::http::state::app::App;
-use crate::http::wire::write::json::Json;
+use crate::http::wire::write::json::{HasNull, to_vec};
 use crate::store::Owner;
 use gramian_numerics::machine::price::Price;
 
@@ -36,11 +38,7 @@ pub trait Direct: DeserializeOwned + Send + 'static {
 ///
 /// # Errors
 /// Returns the [`Problem`] for the client.
-pub async fn serve<D: Direct>(
-    app: Arc<App>,
-    owner: Owner,
-    request: Request,
-) -> Result<Json<D::Answer>, Problem> {
+pub async fn serve<D: Direct>(app: Arc<App>, owner: Owner, request: Request) -> Result<Response, Problem> {
     let (parts, body) = request.into_parts();
     let intake = read_body(&app, owner, &parts.headers, body, &REQUEST_FORMATS).await?;
     let admission = app.compute.admit(owner)?;
@@ -54,11 +52,12 @@ pub async fn serve<D: Direct>(
     admission.set_work(Work { operation: D::NAME, is_cached: false, flops });
     let shared = app.clone();
     let compute = move |observer: &JobObserver| {
-        let answer = request.compute(&Planner::new(&shared, owner), observer);
+        let answer = request.compute(&Planner::new(&shared, owner), observer)?;
         drop(memory);
-        answer
+        // Answers may be long, so they are encoded here as well. A null in one would be a bug.
+        to_vec(&answer).map_err(|HasNull| Problem::internal())
     };
-    let answer = app.compute.run(&admission, flops, compute).await?.0?;
+    let text = app.compute.run(&admission, flops, compute).await?.0?;
     admission.finish();
-    Ok(Json(answer))
+    Ok(([(header::CONTENT_TYPE, "application/json")], text).into_response())
 }

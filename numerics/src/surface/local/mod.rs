@@ -180,7 +180,7 @@ impl LocalSurface {
         };
         match self.patches.points_per_mean() {
             1 => of_rows,
-            group => of_rows.max(2 * group * of_regressions),
+            group => of_rows.max(group.saturating_mul(2 * of_regressions)),
         }
     }
 

@@ -139,7 +139,7 @@ pub(super) fn area(sampling: &Sampling, point: usize, dimension: usize) -> f64 {
 
 /// Returns whether a piece has a hundredth of the points or more. Others may lie inside it.
 pub(super) fn is_large(n_points: usize, n_of_all: usize) -> bool {
-    100 * n_points >= n_of_all
+    n_points >= n_of_all.div_ceil(100)
 }
 
 /// The axis-parallel box around some points.

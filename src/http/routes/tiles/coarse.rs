@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use axum::Extension;
 use axum::extract::{Request, State};
+use axum::response::Response;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -15,7 +16,6 @@ use crate::http::serve::direct::{Direct, serve};
 use crate::http::serve::planner::Planner;
 use crate::http::state::app::App;
 use crate::http::wire::read::points::Points;
-use crate::http::wire::write::json::Json;
 use crate::store::Owner;
 use gramian_numerics::machine::price::Price;
 use gramian_numerics::surface::local::coarse::Coarse;
@@ -63,7 +63,7 @@ pub async fn choose_coarse_cloud(
     State(app): State<Arc<App>>,
     Extension(owner): Extension<Owner>,
     request: Request,
-) -> Result<Json<CoarseResponse>, Problem> {
+) -> Result<Response, Problem> {
     serve::<CoarseRequest>(app, owner, request).await
 }
 

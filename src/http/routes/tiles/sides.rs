@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use axum::Extension;
 use axum::extract::{Request, State};
+use axum::response::Response;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -14,7 +15,6 @@ use crate::http::problem::{Pointers, Problem};
 use crate::http::serve::direct::{Direct, serve};
 use crate::http::serve::planner::Planner;
 use crate::http::state::app::App;
-use crate::http::wire::write::json::Json;
 use crate::store::Owner;
 use gramian_numerics::machine::price::Price;
 use gramian_numerics::surface::tiles::{self, Tiling};
@@ -75,7 +75,7 @@ pub async fn choose_sides(
     State(app): State<Arc<App>>,
     Extension(owner): Extension<Owner>,
     request: Request,
-) -> Result<Json<SidesResponse>, Problem> {
+) -> Result<Response, Problem> {
     serve::<SidesRequest>(app, owner, request).await
 }
 

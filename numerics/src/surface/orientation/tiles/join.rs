@@ -1,7 +1,7 @@
 //! Joins the regions of all tiles, and chooses their sides.
 
 use super::pieces::{Contradiction, Member, Piece, are_nested};
-use super::{Border, Region, TileRegions};
+use super::{Border, Region, TileRegions, total};
 use crate::error::NumericsError;
 use crate::surface::orientation::consistent::{CONTRADICTION, RESOLVED};
 use crate::surface::orientation::forest::SignedForest;
@@ -65,7 +65,7 @@ impl<'a> Tiling<'a> {
             has_sign[number] |= region.n_signed > 0;
         }
         let weight: f64 = borders.iter().map(|border| border.agreeing + border.opposing).sum();
-        let n_edges: usize = self.tiles.iter().map(|tile| tile.n_edges).sum();
+        let n_edges: usize = total(self.tiles.iter().map(|tile| tile.n_edges));
         let mut sides = vec![Side { sign: 1.0, is_doubtful: false }; has_sign.len()];
         if weight >= RESOLVED * n_edges as f64 {
             self.choose(&whole.of_point, &borders, &has_sign, &mut sides);

@@ -20,3 +20,8 @@ pub fn sides_price(n_regions: usize, n_borders: usize) -> Price {
     let n_numbers = n_regions.saturating_mul(24).saturating_add(n_borders.saturating_mul(8));
     Price::of_numbers(n_numbers, 50.0 * (n_regions + n_borders) as f64)
 }
+
+/// Sum of counts that a client sent, which may be of any size.
+fn total(counts: impl Iterator<Item = usize>) -> usize {
+    counts.fold(0, usize::saturating_add)
+}

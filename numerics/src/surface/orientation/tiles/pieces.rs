@@ -1,6 +1,6 @@
 //! Connected pieces of the regions of all tiles, and the side of each.
 
-use super::Region;
+use super::{Region, total};
 use crate::patches::n_regressed;
 use crate::surface::orientation::consistent::LOCAL_CONTRADICTION;
 use crate::surface::orientation::pieces::{Bounds, Evidence, are_several, is_large};
@@ -51,7 +51,7 @@ impl Piece<'_> {
 
     /// Returns whether the coarse cloud has so much of the piece that its function knows the side.
     pub(super) fn is_resolved(&self) -> bool {
-        self.members.iter().map(|member| member.region.n_coarse).sum::<usize>() >= RESOLVED_BY
+        total(self.members.iter().map(|member| member.region.n_coarse)) >= RESOLVED_BY
     }
 
     /// Returns whether the piece is several surfaces that nearly touch. The function contradicts itself
@@ -66,7 +66,7 @@ impl Piece<'_> {
     }
 
     pub(super) fn n_points(&self) -> usize {
-        self.members.iter().map(|member| member.region.n_points).sum()
+        total(self.members.iter().map(|member| member.region.n_points))
     }
 
     pub(super) fn bounds(&self) -> Bounds {
@@ -113,7 +113,7 @@ impl Piece<'_> {
 /// Returns which pieces lie in the box of another one, a large one.
 pub(super) fn are_nested(pieces: &[Piece<'_>]) -> Vec<bool> {
     let bounds: Vec<Bounds> = pieces.iter().map(Piece::bounds).collect();
-    let n_points: usize = pieces.iter().map(Piece::n_points).sum();
+    let n_points = total(pieces.iter().map(Piece::n_points));
     let large: Vec<usize> =
         (0..pieces.len()).filter(|&piece| is_large(pieces[piece].n_points(), n_points)).collect();
     let is_nested =

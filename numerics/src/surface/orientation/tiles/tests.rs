@@ -206,6 +206,10 @@ fn what_leads_to_no_region_is_refused_by_its_place() {
     open.borders[0].regions[1] = 9;
     let tiles = [whole.clone(), open];
     assert!(matches!(Tiling::of(&tiles, &[]), Err(NumericsError::InvalidTile { tile: 1, .. })));
+    let mut vast = whole.clone();
+    vast.regions[0].n_points = usize::MAX;
+    vast.n_edges = usize::MAX;
+    assert_eq!(Tiling::of(&[vast.clone(), vast], &[]).unwrap().sides().len(), 2);
     let mut flat = whole.clone();
     flat.regions[0].lower.pop();
     let tiles = [whole, flat];
