@@ -82,13 +82,13 @@ async fn serve(config: Config) -> Result<(), Box<dyn std::error::Error>> {
     if config.is_exposed() && !config.allow_anonymous {
         let remedy =
             "set GRAMIAN_KEYS_FILE or GRAMIAN_API_KEYS, or GRAMIAN_ALLOW_ANONYMOUS=1 if that is meant";
-        return Err(format!("anyone who reaches {} could use the service: {remedy}", config.bind).into());
+        return Err(format!("anyone who can reach {} could use the service: {remedy}", config.bind).into());
     }
     let listener = TcpListener::bind(config.bind).await;
     let listener =
         listener.map_err(|error| format!("cannot listen on {} (GRAMIAN_BIND): {error}", config.bind))?;
     if config.is_exposed() {
-        tracing::warn!("anyone who reaches this address may use the service: there are no keys");
+        tracing::warn!("no keys are configured: anyone who can reach this address may use the service");
     }
     let mut signals = Signals::new()?;
     let stop = async move {

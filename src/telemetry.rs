@@ -49,7 +49,7 @@ fn send_spans() -> Option<SdkTracerProvider> {
     let exporter = match SpanExporter::builder().with_http().build() {
         Ok(exporter) => exporter,
         Err(error) => {
-            tracing::error!(%error, "spans are not sent");
+            tracing::error!(%error, "spans could not be sent");
             return None;
         }
     };
@@ -69,7 +69,7 @@ impl Drop for Log {
     /// Sends the remaining spans.
     fn drop(&mut self) {
         if let Some(Err(error)) = self.spans.take().map(|spans| spans.shutdown()) {
-            tracing::warn!(%error, "the last spans were not sent");
+            tracing::warn!(%error, "the last spans could not be sent");
         }
     }
 }
@@ -79,7 +79,7 @@ impl Log {
     pub fn mention_losses(&self) {
         let n_lines = self.lost.dropped_lines();
         if n_lines > 0 {
-            tracing::warn!(n_lines, "lines of this log were lost: it was not read fast enough");
+            tracing::warn!(n_lines, "log lines were dropped because the log was not read fast enough");
         }
     }
 }

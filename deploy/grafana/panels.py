@@ -38,10 +38,10 @@ def gauge(family, labels=""):
 # Panels by row. A panel is a title, a unit, queries by legend, and a description.
 ROWS = {
     "At a glance": [
-        ("Replicas that answer", "none", {"replicas": 'sum(up{job="gramian"})'}, "Of those that Prometheus knows."),
+        ("Replicas up", "none", {"replicas": 'sum(up{job="gramian"})'}, "Of those that Prometheus knows."),
         ("Requests", "reqps", {"all": rate("gramian_http_requests_total")}, "Per second, probes included."),
         (
-            "Answers that found their factor",
+            "Answers from a cached factor",
             "percentunit",
             {"hits": share("gramian_cache_requests_total", 'outcome="hit"')},
             "Low where clients do not send Gramian-Cloud, or the cache is too small.",
@@ -58,19 +58,19 @@ ROWS = {
             "By status",
             "reqps",
             {"{{status}}": rate("gramian_http_requests_total", by="status")},
-            "499: the client left before there was an answer.",
+            "499: the client disconnected before the answer.",
         ),
         ("By route", "reqps", {"{{route}}": rate("gramian_http_requests_total", 'route=~"/v1/.*"', "route")}, ""),
         (
             "Time of requests",
             "s",
-            {"median": quantile(0.5), "95 of 100": quantile(0.95), "99 of 100": quantile(0.99)},
+            {"median": quantile(0.5), "95 %": quantile(0.95), "99 %": quantile(0.99)},
             "From the head of a request to the head of its answer, under /v1.",
         ),
-        ("Time by route, 95 of 100", "s", {"{{route}}": quantile(0.95, "route")}, ""),
+        ("Time by route, 95 %", "s", {"{{route}}": quantile(0.95, "route")}, ""),
         ("Refusals by type", "reqps", {"{{type}}": rate("gramian_problems_total", by="type")}, ""),
         (
-            "Beyond the limits of keys",
+            "Rate limited",
             "reqps",
             {"{{instance}}": rate("gramian_rate_limited_total", by="instance")},
             "Answered 429.",
@@ -95,7 +95,7 @@ ROWS = {
             "Jobs",
             "none",
             {"{{status}}": f"sum by (status) ({gauge('gramian_jobs')})"},
-            "Asked for with Prefer: respond-async. As many run at a replica as it has threads; more wait.",
+            "Requested with Prefer: respond-async. A replica runs as many at once as it has threads; others wait.",
         ),
         ("Requests in flight", "none", {"{{instance}}": gauge("gramian_http_requests_in_flight")}, ""),
         (
@@ -107,18 +107,18 @@ ROWS = {
     ],
     "Factors and memory": [
         (
-            "Answers by where their factor came from",
+            "Answers by cache outcome",
             "reqps",
             {"{{outcome}}": rate("gramian_cache_requests_total", by="outcome")},
             "collapsed: another request was computing it.",
         ),
-        ("Solvers made", "ops", {"{{kind}}": rate("gramian_solvers_prepared_total", by="kind")}, ""),
+        ("Solvers prepared", "ops", {"{{kind}}": rate("gramian_solvers_prepared_total", by="kind")}, ""),
         ("Kept", "none", {"{{instance}} {{part}}": gauge("gramian_cache_entries")}, "Clouds, and solvers (cache)."),
         (
             "Evicted",
             "ops",
             {"{{instance}} {{part}}": rate("gramian_cache_evictions_total", by="instance, part")},
-            "What made room for others. As many as are made: the cache is too small.",
+            "Entries evicted to make room. If as many are evicted as prepared, the cache is too small.",
         ),
         (
             "Memory by part",
@@ -139,13 +139,13 @@ ROWS = {
             "Store: up to date",
             "none",
             {"{{instance}}": gauge("gramian_store_up_to_date")},
-            "0: clouds that were acknowledged are in memory alone. Do not end this replica.",
+            "0: some acknowledged clouds are in memory only. Do not stop this replica.",
         ),
         (
             "Store: clouds",
             "none",
             {"{{instance}}": gauge("gramian_store_clouds")},
-            "As of the last look of each replica, ten minutes ago at most.",
+            "As each replica last counted, at most ten minutes ago.",
         ),
         ("Store: bytes", "bytes", {"{{instance}}": gauge("gramian_store_bytes")}, ""),
         (
@@ -158,7 +158,7 @@ ROWS = {
             "Router: requests by replica",
             "reqps",
             {"{{server}}": "sum by (server) (rate(haproxy_server_http_responses_total[$__rate_interval]))"},
-            "Even, if there are many clouds and none has all the load.",
+            "Even if there are many clouds and no single one has most of the load.",
         ),
         (
             "Router: sent again",
@@ -167,7 +167,7 @@ ROWS = {
                 "to the same": "sum(rate(haproxy_server_retry_warnings_total[$__rate_interval]))",
                 "to another": "sum(rate(haproxy_server_redispatch_warnings_total[$__rate_interval]))",
             },
-            "More than none while a replica is replaced or full.",
+            "Above 0 while a replica is replaced or full.",
         ),
         (
             "Router: replicas that are up",

@@ -64,16 +64,16 @@ def leave(report, fleet, router):
     """A client leaves while a large cloud is factorized. The replica learns of it, and frees the place."""
     before = fleet.total(REQUESTS, 'status="499"')
     request = Long(router.url)
-    wait_until(lambda: fleet.total(RUNNING) > 0, "somebody computes")
+    wait_until(lambda: fleet.total(RUNNING) > 0, "a replica computes")
     # The client leaves midway: the whole work takes several seconds.
     time.sleep(0.5)
     n_running = fleet.total(RUNNING)
     request.leave()
     began = time.monotonic()
-    wait_until(lambda: fleet.total(RUNNING) + fleet.total(ADMITTED) == 0, "nobody computes for a client that left")
+    wait_until(lambda: fleet.total(RUNNING) + fleet.total(ADMITTED) == 0, "no replica computes for a client that disconnected")
     seconds = time.monotonic() - began
     n_left = fleet.total(REQUESTS, 'status="499"') - before
-    what = f"{router.name}: computing, counted as left, seconds until its place is free, of a client that left"
+    what = f"{router.name}: a client that disconnects: replicas computing, requests counted as 499, seconds until its place is free"
     figures = (f"{n_running:.0f}", f"{n_left:.0f}", f"{seconds:.1f}")
     report.line(what, ", ".join(figures), n_running > 0 and n_left == 1 and seconds < 2)
 
@@ -94,7 +94,7 @@ def deadly(report, fleet, router):
         fleet.start_replica(name)
     for name in ended:
         router.wait_for(name)
-    what = f"{router.name}: replicas that a request ends which ends whoever computes it"
+    what = f"{router.name}: replicas lost to a request that crashes every process that computes it"
     report.line(what, f"{len(ended)} of {len(REPLICAS)}, answered {request.outcome}", 1 <= len(ended) <= 2)
 
 

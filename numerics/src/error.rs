@@ -47,9 +47,7 @@ pub enum NumericsError {
     },
     #[error("K + alpha I is not positive definite in float64: {reason}")]
     NotPositiveDefinite { reason: NotDefinite, minimum_alpha: f64 },
-    #[error(
-        "the points do not determine the mean that was asked for: they lie in one hyperplane, or are too few"
-    )]
+    #[error("the points do not determine this mean: they lie in one hyperplane, or there are too few")]
     MeanNotDetermined,
     #[error("the answer at query {query} is outside the range of float64")]
     Overflow { query: usize },
@@ -57,11 +55,11 @@ pub enum NumericsError {
     WeightsOverflow,
     #[error("the {solver:?} solver does not serve {quantity:?}")]
     Unsupported { solver: SolverKind, quantity: Quantity },
-    #[error("{n_bytes} bytes of memory are not to be had")]
+    #[error("{n_bytes} bytes of memory cannot be allocated")]
     OutOfMemory { n_bytes: usize },
     #[error("tiles[{tile}] {requirement}")]
     InvalidTile { tile: usize, requirement: &'static str },
-    #[error("links[{link}] leads to a region that no tile has")]
+    #[error("links[{link}] names a region that no tile has")]
     InvalidLink { link: usize },
     #[error("the computation was cancelled")]
     Cancelled,
@@ -74,11 +72,11 @@ pub enum NotDefinite {
     Residual { relative_residual: f64 },
     #[error("the solve leaves a backward error of {backward_error:.1e}")]
     BackwardError { backward_error: f64 },
-    #[error("Cholesky fails at point {point}, and what was asked for needs its factor")]
+    #[error("Cholesky fails at point {point}, and the answer needs its factor")]
     NeedsCholesky { point: usize },
-    #[error("Cholesky fails, and what was asked for needs its factor")]
+    #[error("Cholesky fails, and the answer needs its factor")]
     Unfactorable,
-    #[error("the reciprocal condition {reciprocal_condition:.1e} leaves no digit of what was asked for")]
+    #[error("the reciprocal condition {reciprocal_condition:.1e} leaves no correct digit of the answer")]
     Singular { reciprocal_condition: f64 },
     #[error("the variance at query {query} is {variance:.1e}, beyond rounding")]
     NegativeVariance { query: usize, variance: f64 },

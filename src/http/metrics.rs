@@ -65,26 +65,28 @@ impl Metrics {
             "Requests between their arrival and the head of their answer",
         )?;
         registry.register(Box::new(in_flight.clone()))?;
-        let rate_limited =
-            IntCounter::new("gramian_rate_limited_total", "Requests beyond the rate of their key")?;
+        let rate_limited = IntCounter::new(
+            "gramian_rate_limited_total",
+            "Requests refused because their key exceeded its limits",
+        )?;
         registry.register(Box::new(rate_limited.clone()))?;
         let metrics = Self {
             requests: counters(
                 "gramian_http_requests_total",
-                "Requests by status; 499 where the client left first",
+                "Requests by status; 499 when the client disconnected before the answer",
                 &["method", "route", "status"],
             )?,
             durations,
             in_flight,
-            problems: counters("gramian_problems_total", "Refusals by type of problem", &["type"])?,
+            problems: counters("gramian_problems_total", "Refused requests by problem type", &["type"])?,
             rate_limited,
             cache_requests: counters(
                 "gramian_cache_requests_total",
-                "Answers by where what they were computed from came from",
+                "Answers by cache outcome: hit, miss or collapsed",
                 &["outcome"],
             )?,
-            solvers: counters("gramian_solvers_prepared_total", "Solvers made ready, by kind", &["kind"])?,
-            jobs: counters("gramian_jobs_ended_total", "Jobs that ended, by how", &["outcome"])?,
+            solvers: counters("gramian_solvers_prepared_total", "Solvers prepared, by kind", &["kind"])?,
+            jobs: counters("gramian_jobs_ended_total", "Jobs that ended, by status", &["outcome"])?,
             registry,
         };
         metrics.begin_at_zero();

@@ -75,7 +75,10 @@ pub async fn serve(
     // Jobs are released in order, so that another process continues them at once.
     app.jobs.all_left().await;
     if connections.len() > 0 {
-        tracing::warn!(n_connections = connections.len(), "connections are cut, their answers are not read");
+        tracing::warn!(
+            n_connections = connections.len(),
+            "connections are closed because their answers are not read"
+        );
     }
     connections.cut().await;
     if let Some(following) = following {

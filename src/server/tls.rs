@@ -70,7 +70,7 @@ impl Tls {
                     self.current.store(Arc::new(config));
                     tracing::info!("the certificate was read again");
                 }
-                Err(error) => tracing::error!(error, "the certificate stays as it was"),
+                Err(error) => tracing::error!(error, "the certificate is unchanged"),
             }
         }
     }

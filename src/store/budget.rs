@@ -16,7 +16,7 @@ use std::time::Duration;
 
 use tokio::sync::Notify;
 
-use super::Owner;
+use super::{Owner, share_of_one};
 
 /// Divisor of the budget: large reservations leave `total / SMALL_SHARE` bytes free.
 const SMALL_SHARE: usize = 8;
@@ -66,8 +66,12 @@ pub struct BeyondBudget {
 impl Budget {
     /// Creates a budget of `total` bytes. With several owners, each may hold at most half.
     pub fn new(total: usize, n_owners: usize) -> Self {
-        let share = if n_owners > 1 { total / 2 } else { usize::MAX };
-        let ledger = Ledger { total, share, state: Mutex::default(), released: Notify::new() };
+        let ledger = Ledger {
+            total,
+            share: share_of_one(total, n_owners),
+            state: Mutex::default(),
+            released: Notify::new(),
+        };
         Self { ledger: Arc::new(ledger) }
     }
 
@@ -251,7 +255,7 @@ impl Drop for Place<'_> {
     }
 }
 
-/// Bytes that are held until this value is dropped. It travels with the data that they pay for.
+/// Bytes in use until this value is dropped. It travels with the data that they pay for.
 pub struct Reservation {
     ledger: Arc<Ledger>,
     owner: Owner,

@@ -374,8 +374,7 @@ async fn a_job_that_waits_is_begun_by_whoever_has_a_turn_and_once() {
         two.terminate();
         two.finish()
     };
-    let n_taken_up =
-        log.iter().filter(|line| line.contains("a job that nobody works on is taken up")).count();
+    let n_taken_up = log.iter().filter(|line| line.contains("an abandoned job is resumed")).count();
     assert_eq!(n_taken_up, 1, "{log:?}");
 }
 

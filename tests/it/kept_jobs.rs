@@ -152,8 +152,7 @@ async fn a_result_without_room_is_refused_with_a_remedy() {
         assert_eq!(
             detail,
             format!(
-                "at most {limit} bytes of jobs and their results are kept for a key, and this result does not fit beside \
-                 those that are kept; fetch results and delete their jobs, or ask for less"
+                "at most {limit} bytes of jobs and results are stored per key, and this result does not fit; fetch results and delete their jobs, or ask for less"
             )
         );
         assert!(limit < 8 << 20, "{limit}");

@@ -109,7 +109,7 @@ async fn a_renewed_certificate_is_taken_up_without_a_restart() {
     assert!(get(&mut under_way, "/health/live").await.starts_with("HTTP/1.1 200"));
     // One invalid file of the pair changes nothing.
     fs::write(files.path("key"), "no key").unwrap();
-    while !process.lines.lock().unwrap().iter().any(|line| line.contains("the certificate stays as it was")) {
+    while !process.lines.lock().unwrap().iter().any(|line| line.contains("the certificate is unchanged")) {
         tokio::task::yield_now().await;
     }
     assert!(connect(&process, &second, b"http/1.1").await.is_ok());

@@ -70,12 +70,12 @@ impl KeysFile {
             let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
             let line = 1 + before.matches('\n').count();
             // The message of the TOML error may quote a value.
-            format!("line {line} is not as docs/operations.md describes it")
+            format!("line {line} does not have the form that docs/operations.md describes")
         })?;
         let keys = written.key.into_iter().map(KeyEntry::try_from).collect::<Result<Vec<_>, _>>()?;
         for (index, key) in keys.iter().enumerate() {
             if keys[..index].iter().any(|other| other.digest == key.digest) {
-                return Err(format!("the key {} is there twice", key.name));
+                return Err(format!("the key {} is listed twice", key.name));
             }
         }
         Ok(Self { keys })
@@ -96,7 +96,7 @@ impl TryFrom<WrittenKey> for KeyEntry {
         let digest =
             digest.ok_or_else(|| format!("the hash of {name} is not blake3: and 64 hexadecimal digits"))?;
         if burst.is_some() && requests_per_minute.is_none() {
-            return Err(format!("{name} has a burst and no requests_per_minute"));
+            return Err(format!("{name} has a burst but no requests_per_minute"));
         }
         let rule = Rule { requests_per_minute, burst, concurrent_requests };
         Ok(Self { name, digest: digest.into(), view, rule })

@@ -156,7 +156,7 @@ impl Keys {
                     tracing::info!(n_keys = self.callers.load().len(), "keys were read again");
                 }
                 Err(error) => {
-                    tracing::error!(error, "keys stay as they were: their file (GRAMIAN_KEYS_FILE)")
+                    tracing::error!(error, "the keys are unchanged: their file (GRAMIAN_KEYS_FILE)")
                 }
             }
         }

@@ -47,7 +47,7 @@ impl HeadFault {
             Self::Coding => "chunked is the only Transfer-Encoding",
             Self::LineEnd => "end every line of the head with CR LF",
             Self::Folded => "send every header in one line",
-            Self::Chunks => "frame chunks as RFC 9112, section 7.1, has them",
+            Self::Chunks => "frame chunks as RFC 9112, section 7.1, describes",
         }
     }
 }

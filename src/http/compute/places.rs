@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::calibration::{Calibration, Work};
 use super::progress::Progress;
-use crate::store::Owner;
+use crate::store::{Owner, share_of_one};
 
 /// A bounded number of places. If there are several owners, each may hold at most half.
 pub(super) struct Places {
@@ -44,14 +44,18 @@ pub struct Admission {
 
 impl Places {
     pub(super) fn new(n_places: usize, n_owners: usize, deadline: Duration) -> Arc<Self> {
-        let share = if n_owners > 1 { n_places.div_ceil(2) } else { n_places };
         let state = State {
             admitted: HashMap::new(),
             by_owner: HashMap::new(),
             n_admissions: 0,
             calibration: Calibration::default(),
         };
-        Arc::new(Self { n_places, share, deadline, state: Mutex::new(state) })
+        Arc::new(Self {
+            n_places,
+            share: share_of_one(n_places, n_owners),
+            deadline,
+            state: Mutex::new(state),
+        })
     }
 
     /// Takes a place. On failure, returns the seconds until one is expected to be free.

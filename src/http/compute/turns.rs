@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::sync::oneshot;
 
-use crate::store::Owner;
+use crate::store::{Owner, share_of_one};
 
 /// A fixed number of turns, with a queue per owner.
 pub struct FairSemaphore {
@@ -41,7 +41,8 @@ impl FairSemaphore {
     /// Creates turns that may last for hours. With several owners there are at least two turns, and each
     /// owner may hold half.
     pub fn of_owners(n: usize, n_owners: usize) -> Arc<Self> {
-        if n_owners < 2 { Self::new(n) } else { Self::with_most(n.max(2), n.max(2) / 2) }
+        let n = if n_owners > 1 { n.max(2) } else { n };
+        Self::with_most(n, share_of_one(n, n_owners))
     }
 
     fn with_most(n: usize, most: usize) -> Arc<Self> {

@@ -202,7 +202,7 @@ impl Diagnostics {
     pub fn warn_of_clamping(&mut self, queries: &[usize]) {
         let Some(first) = queries.first() else { return };
         let detail = format!(
-            "variances came out negative within rounding and are served as 0 (queries: {}, the first of them {first})",
+            "variances were negative by rounding and are set to 0 (queries: {}, the first of them {first})",
             queries.len()
         );
         self.warnings.push(Warning { code: WarningCode::VarianceClamped, detail });

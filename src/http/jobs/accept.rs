@@ -97,7 +97,10 @@ async fn accept(runner: Runner, request: Request) -> Result<Response, Problem> {
             }
         }
     }
-    Err(Problem::unavailable("jobs with this Idempotency-Key come and go", SECONDS_UNTIL_COUNTED))
+    Err(Problem::unavailable(
+        "jobs with this Idempotency-Key are created and deleted too quickly",
+        SECONDS_UNTIL_COUNTED,
+    ))
 }
 
 /// Attempts to find or claim the job of a key.
@@ -127,7 +130,7 @@ impl Asked {
         let entered = Entered { runner, here: Some(here) };
         app.jobs.kept.add(id, owner)?;
         let Some(mut room) = app.jobs.room(owner, self.body.len()) else {
-            let reason = "the jobs that are kept leave no room for this request";
+            let reason = "the stored jobs leave no room for this request";
             return Err(app.jobs.kept.refused(owner, reason));
         };
         let name = app.keys.name_of(owner);

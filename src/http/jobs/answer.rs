@@ -63,7 +63,7 @@ impl Runner {
         let app = &self.app;
         let run = Run { here, name, attempt };
         if attempt.lease.n_crashes >= MAX_CRASHES {
-            tracing::error!(job = %here.id, "a job ended its process several times, and is given up");
+            tracing::error!(job = %here.id, "a job crashed its process several times and has failed");
             return self.write(run, Problem::internal().into_response()).await;
         }
         let within = app.config.job_seconds;

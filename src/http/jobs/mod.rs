@@ -69,6 +69,6 @@ pub fn unknown_job(id: &str) -> Problem {
     let id: String = id.chars().take(64).collect();
     Problem::new(
         Slug::UnknownJob,
-        format!("there is no job {id} for this key: it never was, or is forgotten"),
+        format!("this key has no job {id}: it was never created, was deleted, or its result expired"),
     )
 }

@@ -143,7 +143,7 @@ impl Runner {
 
     fn take_up(&self, job: &JobObjects, owner: Owner) {
         if let Some(here) = self.app.jobs.add(job.id, owner, job.lease) {
-            tracing::info!(job = %job.id, "a job that nobody works on is taken up");
+            tracing::info!(job = %job.id, "an abandoned job is resumed");
             tokio::spawn(self.clone().run(here));
         }
     }
@@ -151,7 +151,7 @@ impl Runner {
 
 fn warn_of<T>(looked: Result<T, Unavailable>) {
     if let Err(error) = looked {
-        tracing::warn!(%error, "jobs are not looked after");
+        tracing::warn!(%error, "maintenance of jobs fails");
     }
 }
 

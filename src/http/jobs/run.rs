@@ -57,7 +57,7 @@ impl Runner {
         let attempt = match self.claim(here, &name).await {
             Ok(Some(attempt)) => attempt,
             Ok(None) => return,
-            Err(error) => return tracing::error!(job = %here.id, %error, "a job is put off"),
+            Err(error) => return tracing::error!(job = %here.id, %error, "a job is postponed"),
         };
         // From here on, other processes also see that the job is running.
         here.has_lease.store(true, Ordering::Relaxed);
@@ -71,7 +71,7 @@ impl Runner {
             Ok(Ended::Done) => {}
             Ok(Ended::Released) => self.release(here, &name, attempt).await,
             Err(error) => {
-                tracing::error!(job = %here.id, %error, "a job is put off");
+                tracing::error!(job = %here.id, %error, "a job is postponed");
                 self.release(here, &name, attempt).await;
             }
         }

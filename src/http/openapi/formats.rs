@@ -28,8 +28,7 @@ pub fn add(document: &mut utoipa::openapi::OpenApi) {
                 Format::Npy => "The points, `[n, d]`, as little- or big-endian float64 or float32.",
                 Format::Ply => {
                     "PLY 1.0, ascii or binary of either byte order. The properties x, y, z of element vertex are the points, and \
-                     nx, ny, nz their normals if all three are there, of any type of number; other properties and elements are \
-                     passed over."
+                     nx, ny, nz their normals if all three are there, of any type of number; other properties and elements are ignored."
                 }
                 Format::Json | Format::Safetensors => {
                     "F64 or F32 tensors named as the JSON arrays, those within objects as `cloud.points`; the other fields \

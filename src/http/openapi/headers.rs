@@ -13,7 +13,7 @@ const HEADERS: [(&str, &str, &str); 8] = [
     (
         "X-Request-Id",
         "0193a5e7-8c1d-7b22-9f0e-5d3c6f1a2b4c",
-        "The id of the request, as in the logs and in `instance` of problems; the client's own if it sent a short plain one.",
+        "The id of the request, as in the logs and in `instance` of problems; the client's own if it sent a valid one.",
     ),
     (
         "Server-Timing",
@@ -23,14 +23,13 @@ const HEADERS: [(&str, &str, &str); 8] = [
     (
         "Cache-Status",
         "gramian; hit",
-        "Whether the factorization was there: `gramian; hit`, `gramian; fwd=miss; stored`, `gramian; fwd=miss; collapsed` \
-         (another request computed it), `gramian; fwd=miss`. With two factorizations a hit only if both were there.",
+        "Whether the factorization was cached: `gramian; hit`, `gramian; fwd=miss; stored`, `gramian; fwd=miss; collapsed` \
+         (another request computed it), `gramian; fwd=miss`. An answer from two factorizations is a hit only if both were cached.",
     ),
     (
         "Gramian-Cloud",
         "bd711900da5366ee5d24b56f902cd7e737e487987d5285c2791b2955e124c69c",
-        "The cloud that the answer is about. Send it with requests that name a cloud: a proxy in front of several servers finds \
-         the one by it that has its factorizations. It is repeated in every answer, refusals included.",
+        "The cloud that the answer is about. Send it with requests that name a cloud: a proxy in front of several servers routes by it to the server that holds the factorizations. Every answer repeats it, including refusals.",
     ),
     ("Location", "/v1/clouds/…", "The path of the cloud."),
     ("ETag", "W/\"…\"", "The id of the cloud in quotes, weak; for If-None-Match."),

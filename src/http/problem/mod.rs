@@ -159,7 +159,7 @@ impl Problem {
 
     /// 503 if no place, memory or thread is free.
     pub fn overloaded(retry_after_seconds: u64) -> Self {
-        Self::unavailable("all that can be served at once is being served", retry_after_seconds)
+        Self::unavailable("the server is at its limit of simultaneous requests", retry_after_seconds)
     }
 
     /// 429 beyond a limit of the key.

@@ -79,7 +79,7 @@ catalogue! {
         "The cloud was never posted with this key, was deleted, or was dropped as the least recently used. Post its \
         points again: the id stays the same.";
     UnknownJob "unknown-job" NOT_FOUND "No such job"
-        "The job was never asked for with this key, was deleted, or its result expired after \
+        "The job was never created with this key, was deleted, or its result expired after \
         GRAMIAN_JOB_RESULT_SECONDS. Send the request again.";
     NotFound "not-found" NOT_FOUND "No such path"
         "The path is not part of the interface. /openapi.json lists every path.";

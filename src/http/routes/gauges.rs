@@ -35,14 +35,14 @@ fn read_load(app: &App, moment: &Moment) -> Result<(), Error> {
     let (running, waiting): (Vec<_>, Vec<_>) =
         load.lanes.iter().map(|lane| ((lane.name, lane.n_running), (lane.name, lane.n_waiting))).unzip();
     let of_jobs = [("queued", jobs.n_waiting), ("running", jobs.n_running)];
-    moment.gauge("gramian_compute_places", "Requests that are admitted at once at most", load.n_places)?;
-    moment.gauge("gramian_compute_admitted", "Requests that are admitted", load.n_admitted)?;
+    moment.gauge("gramian_compute_places", "Most requests admitted at once", load.n_places)?;
+    moment.gauge("gramian_compute_admitted", "Requests admitted now", load.n_admitted)?;
     moment.gauge("gramian_compute_threads", "Threads of each lane", app.compute.n_threads())?;
-    let help = "What waits for its turn: requests on all lanes, and jobs";
+    let help = "Requests and jobs waiting for a thread";
     moment.gauge("gramian_queue_depth", help, n_waiting)?;
     moment.gauges("gramian_compute_running", "Jobs that run", "lane", &running)?;
-    moment.gauges("gramian_compute_waiting", "Jobs that wait for their turn", "lane", &waiting)?;
-    moment.gauges("gramian_jobs", "Jobs of this process that have not ended", "status", &of_jobs)
+    moment.gauges("gramian_compute_waiting", "Jobs waiting for a thread", "lane", &waiting)?;
+    moment.gauges("gramian_jobs", "Unfinished jobs of this process", "status", &of_jobs)
 }
 
 fn read_memory(app: &App, moment: &Moment) -> Result<(), Error> {
@@ -60,13 +60,13 @@ fn read_memory(app: &App, moment: &Moment) -> Result<(), Error> {
         ("intake", app.memory.intake),
         ("jobs", app.memory.jobs),
     ];
-    moment.gauges("gramian_memory_used_bytes", "Bytes that are held", "part", &used)?;
-    moment.gauges("gramian_memory_limit_bytes", "Bytes that may be held", "part", &limits)?;
+    moment.gauges("gramian_memory_used_bytes", "Bytes in use", "part", &used)?;
+    moment.gauges("gramian_memory_limit_bytes", "Most bytes that may be in use", "part", &limits)?;
     let counts = [("clouds", app.clouds.counts()), ("cache", app.prepared.counts())];
     let kept = counts.map(|(part, Counts { n_kept, .. })| (part, n_kept));
     let evicted = counts.map(|(part, Counts { n_evicted, .. })| (vec![part], n_evicted));
     moment.gauges("gramian_cache_entries", "Clouds and solvers in memory", "part", &kept)?;
-    let help = "What made room for others";
+    let help = "Entries evicted to make room";
     moment.counters("gramian_cache_evictions_total", help, &["part"], &evicted)
 }
 
@@ -85,16 +85,16 @@ fn read_store(app: &App, moment: &Moment) -> Result<(), Error> {
             [(vec![verb.name(), "ok"], n_answered), (vec![verb.name(), "error"], n_failed)]
         })
         .collect();
-    let help = "0 while clouds that were acknowledged are in memory alone";
+    let help = "1 if the store holds every acknowledged cloud, 0 if some are in memory only";
     moment.gauge("gramian_store_up_to_date", help, usize::from(is_up_to_date))?;
     moment.gauge("gramian_store_clouds", "Clouds in the store, about", n_clouds as usize)?;
     moment.gauge("gramian_store_bytes", "Bytes of clouds in the store, about", n_bytes as usize)?;
     let help = "Bytes of factors in the store, about";
     moment.gauge("gramian_store_factor_bytes", help, n_factor_bytes as usize)?;
     moment.gauge("gramian_store_job_bytes", "Bytes of jobs in the store, about", n_job_bytes)?;
-    let (help, labels) = ("What was asked of the store", ["operation", "outcome"]);
+    let (help, labels) = ("Operations on the store", ["operation", "outcome"]);
     moment.counters("gramian_store_operations_total", help, &labels, &operations)?;
-    let help = "Objects that were not as they were written";
+    let help = "Objects of the store found damaged";
     moment.counters("gramian_store_damaged_total", help, &[], &[(vec![], n_damaged)])
 }
 

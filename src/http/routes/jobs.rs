@@ -179,7 +179,7 @@ pub async fn get_job_result(
     let deadline = app.config.deadline();
     let patience = deadline.saturating_sub(MARGIN).max(deadline / 2);
     let ended = tokio::time::timeout(patience, look_until_ended(&app, owner, id)).await;
-    let detail = "the job has not ended: it goes on, ask for its result again";
+    let detail = "the job has not ended; request its result again later";
     ended.map_err(|_| Problem::new(Slug::DeadlineExceeded, detail))??;
     drop(waiting);
     let name = app.keys.name_of(owner);
@@ -187,10 +187,13 @@ pub async fn get_job_result(
     let Some(found) = found else {
         // Either the job was deleted meanwhile, which is 404 here, or its result was damaged.
         find_known(&app, &name, id).await?;
-        return Err(Problem::unavailable("the result was damaged, and is made again", SECONDS_UNTIL_BACK));
+        return Err(Problem::unavailable(
+            "the stored result was damaged and is being computed again",
+            SECONDS_UNTIL_BACK,
+        ));
     };
     if found.head.outcome == Outcome::Cancelled {
-        return Err(Problem::new(Slug::UnknownJob, "the job was cancelled: there is no result"));
+        return Err(Problem::new(Slug::UnknownJob, "the job was cancelled and has no result"));
     }
     if found.head.outcome == Outcome::Failed {
         let status = StatusCode::from_u16(found.head.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);

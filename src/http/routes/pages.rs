@@ -22,12 +22,12 @@ use crate::http::problem::slug::Slug;
 )]
 pub async fn get_start_page() -> Html<String> {
     let links = [
-        ("docs/", "The interface, to read and to try"),
+        ("docs/", "Interactive documentation of the API"),
         ("openapi.json", "The OpenAPI document, version 3.1"),
-        ("openapi-3.0.json", "The document for generators that stop at OpenAPI 3.0"),
+        ("openapi-3.0.json", "The OpenAPI document, version 3.0, for generators that need it"),
         ("problems", "What refusals mean"),
         ("version", "What is running"),
-        ("health/ready", "Whether it takes requests"),
+        ("health/ready", "Whether the service is ready for requests"),
     ];
     let mut body =
         String::from("<p>Geometric kernel interpolation and regression on point clouds.</p>\n<ul>\n");

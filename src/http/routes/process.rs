@@ -70,7 +70,7 @@ pub async fn check_ready(State(app): State<Arc<App>>) -> Result<Json<Health>, Pr
         return Err(Problem::overloaded(1));
     }
     if app.config.store_required && app.durable.as_ref().is_some_and(|durable| !durable.is_up_to_date()) {
-        return Err(Problem::unavailable("the store does not take what it is given", 5));
+        return Err(Problem::unavailable("the store does not accept writes", 5));
     }
     app.compute.check_ready().await?;
     Ok(Json(Health { status: "ok" }))

@@ -159,7 +159,7 @@ impl Reader<'_> {
         loop {
             let Ok(frame) = timeout_at(until, body.frame()).await else {
                 let detail = format!(
-                    "the body came too slowly: {} bytes in {:.0} s",
+                    "the body arrived too slowly: {} bytes in {:.0} s",
                     self.bytes.len(),
                     self.began.elapsed().as_secs_f64()
                 );

@@ -148,7 +148,7 @@ fn within_deadline(app: &App, admission: &Admission, seconds: f64) -> Result<(),
         return Ok(());
     }
     let detail = format!(
-        "this would take about {seconds:.0} s, and answers are waited for {deadline} s; nothing was computed"
+        "this would take about {seconds:.0} s, longer than the deadline of {deadline} s; nothing was computed"
     );
     Err(Problem::new(Slug::DeadlineExceeded, detail))
 }

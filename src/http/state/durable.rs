@@ -72,7 +72,7 @@ impl Durable {
         let was_up_to_date = self.is_up_to_date();
         self.n_refused.fetch_add(1, Ordering::AcqRel);
         if was_up_to_date {
-            tracing::error!(%reason, "clouds are kept in memory alone until the store takes them");
+            tracing::error!(%reason, "clouds are kept in memory only until the store accepts them");
         }
     }
 }

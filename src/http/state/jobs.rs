@@ -11,11 +11,11 @@ use super::kept::Kept;
 use crate::http::compute::{FairSemaphore, Progress};
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
-use crate::store::Owner;
 use crate::store::budget::{Budget, Reservation};
 use crate::store::objects::jobs::JobId;
 use crate::store::objects::room::Room;
 use crate::store::objects::{Objects, OwnerName, Unavailable};
+use crate::store::{Owner, share_of_one};
 
 /// The jobs of this process, and the objects of all jobs.
 pub struct Jobs {
@@ -78,7 +78,7 @@ impl Jobs {
             kept: Kept::new(limits.max_kept, n_owners),
             turns: FairSemaphore::of_owners(n_threads, n_owners),
             most,
-            most_of_owner: if n_owners > 1 { most.div_ceil(2) } else { most },
+            most_of_owner: share_of_one(most, n_owners),
             followers: Budget::new(limits.max_followers, n_owners),
         }
     }
@@ -168,7 +168,7 @@ impl Jobs {
     pub fn too_large(&self) -> Problem {
         let limit = self.bytes.largest();
         let detail = format!(
-            "at most {limit} bytes of jobs and their results are kept for a key, and this result does not fit beside those that are kept"
+            "at most {limit} bytes of jobs and results are stored per key, and this result does not fit"
         );
         Problem::beyond(Slug::ProblemTooLarge, limit, detail)
             .with_remedy("fetch results and delete their jobs, or ask for less")

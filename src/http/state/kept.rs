@@ -9,9 +9,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, SystemTime};
 
 use crate::http::problem::Problem;
-use crate::store::Owner;
 use crate::store::budget::Reservation;
 use crate::store::objects::jobs::JobId;
+use crate::store::{Owner, share_of_one};
 
 /// Seconds after which a refused client may try again. By then the jobs of its owner have been listed anew.
 pub const SECONDS_UNTIL_COUNTED: u64 = 5;
@@ -49,8 +49,7 @@ impl KeptJob {
 
 impl Kept {
     pub fn new(most: usize, n_owners: usize) -> Self {
-        let most_of_owner = if n_owners > 1 { most.div_ceil(2) } else { most };
-        Self { most, most_of_owner, table: Mutex::default() }
+        Self { most, most_of_owner: share_of_one(most, n_owners), table: Mutex::default() }
     }
 
     /// Adds a job of an owner.

@@ -91,14 +91,14 @@ impl CloudHead {
     /// # Errors
     /// [`Damaged`] if the bytes are not a head, or not as written.
     pub(super) fn decode(bytes: &[u8]) -> Result<Self, Damaged> {
-        let rest = bytes.strip_prefix(MAGIC).ok_or(Damaged("its first bytes are those of no cloud"))?;
+        let rest = bytes.strip_prefix(MAGIC).ok_or(Damaged("it does not start like a cloud"))?;
         let counts = rest.get(..8 * N_COUNTS).ok_or(CUT)?;
         let mut counts =
             counts.chunks_exact(8).map(|word| u64::from_le_bytes(word.try_into().unwrap_or_default()));
         let mut next = || counts.next().unwrap_or_default();
         let (nanoseconds, n_points, dimension, has_normals, n_duplicates) =
             (next(), next(), next(), next(), next());
-        let count = |x: u64| usize::try_from(x).map_err(|_| Damaged("a number is beyond this machine"));
+        let count = |x: u64| usize::try_from(x).map_err(|_| Damaged("a number does not fit this machine"));
         let (n_points, dimension) = (count(n_points)?, count(dimension)?);
         // Nothing is built from the numbers before their hash is checked.
         if dimension > bytes.len() {
@@ -122,10 +122,10 @@ impl CloudHead {
     }
 }
 
-pub(super) const CUT: Damaged = Damaged("it ends too early");
-const OTHER: Damaged = Damaged("its bytes are not those that were written");
-const NO_CLOUD: Damaged = Damaged("its numbers are no cloud");
-const ANOTHER: Damaged = Damaged("it is another cloud than its name says");
+pub(super) const CUT: Damaged = Damaged("it is truncated");
+const OTHER: Damaged = Damaged("its checksum does not match");
+const NO_CLOUD: Damaged = Damaged("its numbers do not form a cloud");
+const ANOTHER: Damaged = Damaged("its name is that of another cloud");
 
 /// Encodes a cloud as the pieces of its object. The numbers are shared with the cloud, not copied.
 pub fn encode(cloud: StoredCloud) -> Vec<Bytes> {
@@ -286,6 +286,6 @@ mod tests {
         }
         assert!(decode(id, &[&bytes[..], &[0]].concat()).is_err());
         let name = stored(false).0;
-        assert_eq!(decode(name, &bytes).err(), Some(Damaged("it is another cloud than its name says")));
+        assert_eq!(decode(name, &bytes).err(), Some(Damaged("its name is that of another cloud")));
     }
 }

@@ -245,7 +245,7 @@ impl Objects {
         let was_there = is_there && self.delete(&self.cloud(owner, id)).await?;
         // The cloud is gone now. If deleting the rest fails, a sweep deletes it later.
         if let Err(error) = self.delete_remains(owner, id).await {
-            tracing::warn!(%error, cloud = %id, "what belonged to a deleted cloud is left to the next sweep");
+            tracing::warn!(%error, cloud = %id, "factors of a deleted cloud are left to the next sweep");
         }
         Ok(was_there)
     }
@@ -280,7 +280,7 @@ impl Objects {
         let (name, aside) = (self.cloud(owner, id), self.aside(owner, id));
         self.report(&name, damaged);
         let is_aside = self.store.rename(&name, &aside).await.is_ok();
-        tracing::error!(object = %name, %aside, is_aside, "a cloud is put aside");
+        tracing::error!(object = %name, %aside, is_aside, "a damaged cloud is set aside");
     }
 
     /// Reads the first bytes of an object, as many as its head has.

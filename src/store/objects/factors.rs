@@ -124,7 +124,7 @@ impl Objects {
         let path = self.factor(name);
         self.n_damaged.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         let is_gone = self.delete(&path).await.is_ok();
-        tracing::error!(object = %path, reason = damaged.0, is_gone, "a factor is damaged, and made again");
+        tracing::error!(object = %path, reason = damaged.0, is_gone, "a stored factor is damaged and is computed again");
     }
 
     /// Deletes all factors of a cloud.

@@ -45,9 +45,9 @@ pub struct Found {
 /// Reason why a body breaks off.
 #[derive(Debug, Clone, thiserror::Error)]
 pub enum BrokenOff {
-    #[error("the store does not go on: {0}")]
+    #[error("reading from the store failed: {0}")]
     Store(String),
-    #[error("its bytes are not those that were written")]
+    #[error("its checksum does not match")]
     Damaged,
 }
 
@@ -138,7 +138,7 @@ impl Objects {
     /// Opens an object that was written in pieces.
     ///
     /// # Errors
-    /// [`Unavailable`]. [`Damaged`] if it has no first line.
+    /// [`Unavailable`]. [`Damaged`] if its first line is missing.
     pub(super) async fn open_pieces(
         &self,
         name: &Path,
@@ -151,7 +151,7 @@ impl Objects {
         let first = loop {
             let next = bytes.try_next().await.map_err(|error| self.failed(Verb::Read, name, error))?;
             let Some(mut piece) = next.filter(|_| line.len() <= MAX_LINE) else {
-                return Ok(Some(Err(Damaged("it has no first line"))));
+                return Ok(Some(Err(Damaged("its first line is missing"))));
             };
             let searched = &piece[..piece.len().min(MAX_LINE)];
             match memchr::memchr(b'\n', searched) {
@@ -191,10 +191,10 @@ pub(super) fn sealed(line: Bytes) -> PutPayload {
 /// # Errors
 /// [`Damaged`] unless the object is as it was written.
 pub(super) fn unsealed(bytes: &[u8]) -> Result<&[u8], Damaged> {
-    let end = bytes.len().checked_sub(HASH_BYTES).ok_or(Damaged("it ends too early"))?;
+    let end = bytes.len().checked_sub(HASH_BYTES).ok_or(Damaged("it is truncated"))?;
     let (line, hash) = bytes.split_at(end);
     let is_whole = blake3::hash(line).as_bytes() == hash;
-    if is_whole { Ok(line) } else { Err(Damaged("its bytes are not those that were written")) }
+    if is_whole { Ok(line) } else { Err(Damaged("its checksum does not match")) }
 }
 
 /// Received bytes that are not handed out yet.

@@ -124,8 +124,8 @@ impl Objects {
         let removed = tokio::task::spawn_blocking(move || remove_half_written(&directory, now)).await;
         match removed {
             Ok(0) => {}
-            Ok(n_files) => tracing::info!(n_files, "files that were never whole were removed"),
-            Err(error) => tracing::error!(%error, "files that were never whole are not removed"),
+            Ok(n_files) => tracing::info!(n_files, "incomplete files were removed"),
+            Err(error) => tracing::error!(%error, "incomplete files could not be removed"),
         }
     }
 

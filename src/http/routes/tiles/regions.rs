@@ -79,7 +79,7 @@ impl Operation for RegionsRequest {
         let main = planner.surface_fit(fit, Purpose::Normals, &request)?;
         let (n, d) = (main.on.n_points(), main.on.stored.cloud.dimension());
         let Some(directions) = main.on.stored.normals.clone() else {
-            let detail = "the cloud of a tile has directions outward as its normals";
+            let detail = "the cloud of a tile needs normals: its outward directions";
             return Err(Problem::of_field(Slug::InvalidRequest, "/cloud/normals", detail));
         };
         let coarse = self.coarse.unwrap_or_default();
@@ -117,7 +117,7 @@ fn check_points(points: &[usize], n: usize, pointer: &str) -> Result<(), Problem
     match (0..points.len()).find(is_wrong) {
         None => Ok(()),
         Some(at) => {
-            let detail = format!("positions must ascend, and be below the number of points, {n}");
+            let detail = format!("positions must ascend and be below the number of points, {n}");
             Err(Problem::invalid_request(format!("{pointer}/{at}"), detail))
         }
     }

@@ -196,7 +196,7 @@ const N_ALPHAS: usize = 61;
 /// A path takes too long beyond it.
 const MAX_PATH_POINTS: usize = 3000;
 
-/// Largest number of points of a selection.
+/// Largest number of points in a model selection.
 ///
 /// A hundred factorizations take minutes at this size.
 const MAX_POINTS: usize = 5000;
@@ -207,7 +207,7 @@ impl Operation for ModelSelectionRequest {
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let search = Search::of(&self)?;
         if self.duplicates == Some(DuplicatePolicy::Merge) {
-            let detail = "what is left out are points of the cloud: merge those that coincide beforehand";
+            let detail = "cross-validation leaves out points of the cloud, so they cannot be merged here: merge coinciding points before sending";
             return Err(Problem::invalid_request("/duplicates", detail));
         }
         let given = GivenValues::one(std::mem::take(&mut self.values));
@@ -218,8 +218,9 @@ impl Operation for ModelSelectionRequest {
         let (n, d) = (main.on.n_points(), main.on.stored.cloud.dimension());
         if n > MAX_POINTS {
             let problem =
-                Problem::too_large(Slug::ProblemTooLarge, "points of a selection", MAX_POINTS, Some(n));
-            let remedy = "select on a sample of the points, and send what was found with all of them";
+                Problem::too_large(Slug::ProblemTooLarge, "points in a model selection", MAX_POINTS, Some(n));
+            let remedy =
+                "select on a sample of the points, then send the selected parameters with all of them";
             return Err(problem.at(main.on.pointers.points).with_remedy(remedy));
         }
         search.check_axes_of(d)?;

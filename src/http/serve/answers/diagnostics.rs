@@ -13,10 +13,9 @@ use gramian_numerics::sums::regularization::Regularization;
 /// Reciprocal condition below which fewer than three digits of the weights are certain.
 const ILL_CONDITIONED: f64 = 1e-13;
 
-const TOO_SMALL: &str = "squares of the values leave float64: their variance is taken to be 1e-290, and deviations are too long; scale the values";
-const MISFIT_OF_LEARNED: &str =
-    "deviations there may be too short: look at these values, or give a kernel that is shorter or rougher";
-const MISFIT_OF_GIVEN: &str = "deviations are too short: leave out kernel and alpha, so that they are learned, or raise variance and alpha";
+const TOO_SMALL: &str = "squares of the values underflow float64: their variance is set to 1e-290, and deviations are too large; scale the values";
+const MISFIT_OF_LEARNED: &str = "deviations there may be too small: check these values, or use a kernel with a shorter length scale or less smoothness";
+const MISFIT_OF_GIVEN: &str = "deviations are too small: leave out kernel and alpha so that they are learned, or raise variance and alpha";
 
 impl Fitted {
     /// Returns the diagnostics of this fit and of the function or surface served from it.
@@ -83,7 +82,7 @@ impl Fitted {
         if is_pivoted {
             let (rank, n) = (report.rank.unwrap_or_default(), plan.fitted.n_points());
             let detail = format!(
-                "Cholesky fails in float64; least squares on {rank} of {n} points, which span the rest to rounding"
+                "Cholesky fails in float64; solved by least squares on {rank} of {n} points, which span the others to rounding"
             );
             warn(WarningCode::IllConditioned, detail);
         } else if reciprocal_condition < ILL_CONDITIONED && !plan.process.is_learned {
@@ -104,7 +103,7 @@ impl Fitted {
         }
         if report.n_dependent > 0 {
             let detail = format!(
-                "points that follow from nearer ones to rounding are left out of the {} nearest (queries: {} of {n_queries})",
+                "some of the {} nearest points depend on nearer ones to rounding and are left out (queries: {} of {n_queries})",
                 report.n_neighbours, report.n_dependent
             );
             warn(WarningCode::IllConditioned, detail);

@@ -194,7 +194,7 @@ fn is_laplace(signature: &Interpolant) -> bool {
 const LAPLACE_TOO_ROUGH: &str = "curvatures see the cusp of the kernel at the points; raise epsilon until sqrt(epsilon)·length_scale is twice the spacing";
 const KERNEL_TOO_ROUGH: &str = "curvatures see the cusp of the kernel at the points; take a smoother kernel";
 const DISAGREES: &str = "curvatures are not confirmed by the points around them; see degenerate";
-const UNCERTAIN: &str = "normals are uncertain by 17 degrees and more; see degenerate";
+const UNCERTAIN: &str = "normals are uncertain by 17 degrees or more; see degenerate";
 const FAR: &str = "farther from the cloud than three spacings";
 const OPEN_CLOUD: &str =
-    "the cloud has a rim, so that outward has no meaning; the side is that of most gradients";
+    "the cloud has a rim, so outward is undefined; normals take the side of most gradients";

@@ -55,7 +55,7 @@ pub async fn restore(app: &Arc<App>, admission: &Admission, plan: &FitPlan) -> O
         Ok(solver) => solver.map(|solver| Model::System(Arc::new(solver))),
         Err(Lost::Gone) => None,
         Err(Lost::Unavailable(error)) => {
-            tracing::warn!(%error, "a factor is made again");
+            tracing::warn!(%error, "a stored factor is discarded and computed again");
             None
         }
         Err(Lost::Damaged(damaged)) => {
@@ -85,7 +85,7 @@ async fn read(
     let mut reading = app.compute.run_small(owner, begin).await.ok().flatten().ok_or(Lost::Gone)?;
     let expected = reading.at + 8 * (n_points + reading.builder.n_missing()) as u64 + HASH_BYTES as u64;
     if head.n_points != n_points || n_bytes != expected {
-        return Err(Lost::Damaged(Damaged("it has another length than it should have")));
+        return Err(Lost::Damaged(Damaged("its length is wrong")));
     }
     let end = n_bytes - HASH_BYTES as u64;
     while reading.at < end {
@@ -97,11 +97,11 @@ async fn read(
     let hash = durable.objects.factor_range(name, end..n_bytes).await?.ok_or(Lost::Gone)?;
     let Reading { builder, hasher, weights, .. } = reading;
     if hasher.finalize().as_bytes()[..] != hash[..] {
-        return Err(Lost::Damaged(Damaged("its bytes are not those that were written")));
+        return Err(Lost::Damaged(Damaged("its checksum does not match")));
     }
     let restored =
         Solver::restore(builder, system.clone(), weights, head.norm1(), head.reciprocal_condition());
-    restored.map(Some).ok_or(Lost::Damaged(Damaged("it is no factor of its system")))
+    restored.map(Some).ok_or(Lost::Damaged(Damaged("it is not a factor of its system")))
 }
 
 /// A factor that has been read in part.
@@ -143,7 +143,7 @@ pub fn keep(app: &Arc<App>, plan: &FitPlan, stored: &Arc<PreparedFit>) {
         let Some(durable) = &app.durable else { return };
         let Ok(_alone) = durable.writing_factor.try_lock() else { return };
         if let Err(error) = write(&app, &name, stored).await {
-            tracing::warn!(%error, "a factor is not kept");
+            tracing::warn!(%error, "a factor could not be stored");
         }
     });
 }

@@ -112,7 +112,7 @@ async fn reserve_for_reading(
     let n_reserved = usize::try_from(n_bytes).map_or(usize::MAX, |n| n.saturating_mul(READING));
     if n_reserved > app.intake.largest() {
         // Such an object is damaged, or was written when the service had more memory.
-        tracing::error!(cloud = %id, n_bytes, "a cloud of the store takes more memory than there may be for one");
+        tracing::error!(cloud = %id, n_bytes, "a stored cloud needs more memory than one cloud may take");
         return Err(Problem::internal());
     }
     let mut memory = app.intake.try_reserve(owner, 0).ok_or_else(Problem::internal)?;
@@ -130,7 +130,7 @@ async fn reserve_for_reading(
 pub async fn keep_all(app: &Arc<App>, owner: Owner, clouds: &[Arc<RegisteredCloud>]) {
     for cloud in clouds {
         if keep(app, owner, cloud).await.is_err() {
-            tracing::warn!(cloud = %cloud.id, "a cloud is kept nowhere");
+            tracing::warn!(cloud = %cloud.id, "a cloud could not be stored");
         }
     }
 }
@@ -169,7 +169,7 @@ pub async fn keep(app: &Arc<App>, owner: Owner, cloud: &Arc<RegisteredCloud>) ->
             Kept::Nowhere(reason) => {
                 durable.fell_behind(&reason);
                 let detail =
-                    "the store of clouds does not answer, and memory is full of clouds that it has not taken";
+                    "the store of clouds does not answer, and memory is full of clouds that are not stored yet";
                 Err(Problem::unavailable(detail, SECONDS_UNTIL_BACK))
             }
         }
@@ -247,16 +247,16 @@ pub async fn retain(app: Arc<App>) {
         let knows = |name: &OwnerName| app.keys.owner_named(name).is_some();
         let (kept, longest) = app.config.job_retention();
         if let Err(error) = durable.objects.sweep_jobs(knows, kept, longest, now).await {
-            tracing::error!(%error, "jobs of keys that are gone are not let go");
+            tracing::error!(%error, "jobs of removed keys could not be deleted");
         }
         match durable.objects.sweep(app.config.retention(), now).await {
-            Err(error) => tracing::error!(%error, "clouds are not let go"),
+            Err(error) => tracing::error!(%error, "expired clouds could not be deleted"),
             Ok(Swept { n_clouds, n_bytes, n_factor_bytes, gone }) => {
                 durable.n_factor_bytes.store(n_factor_bytes, Ordering::Relaxed);
                 durable.n_clouds.store(n_clouds, Ordering::Relaxed);
                 durable.n_bytes.store(n_bytes, Ordering::Relaxed);
                 if !gone.is_empty() {
-                    tracing::info!(n_gone = gone.len(), n_clouds, n_bytes, "clouds were let go");
+                    tracing::info!(n_gone = gone.len(), n_clouds, n_bytes, "expired clouds were deleted");
                 }
                 for (owner, id) in gone {
                     if let Some(owner) = app.keys.owner_named(&owner) {

@@ -97,10 +97,8 @@ impl FittedCloud {
 /// Returns the reason for an automatic choice of the local solver, as worded in diagnostics.
 pub fn words(reason: AutoLocal) -> &'static str {
     match reason {
-        AutoLocal::BeyondDense => "the cloud has more points than are factorized densely",
-        AutoLocal::ManyPoints => {
-            "regressions from the nearest points take time linear in the points, of which there are many"
-        }
+        AutoLocal::BeyondDense => "the cloud has more points than a dense factorization may have",
+        AutoLocal::ManyPoints => "local regressions take time linear in the points, and this cloud is large",
         AutoLocal::Deviations => "standard deviations come from local regressions",
     }
 }

@@ -20,31 +20,32 @@ impl DenseOnly {
     /// Returns 422 where the request asks the local solver for this quantity.
     pub(super) fn refused_by_local(self) -> Problem {
         let detail = format!(
-            "the local solver knows each query by itself and has no {}; leave it out, or take \"solver\": \"dense\"",
+            "the local solver treats each query separately, so it has no {}; leave it out, or set \"solver\": \"dense\"",
             self.name
         );
         Problem::of_field(Slug::UnsupportedBySolver, self.pointer, detail)
     }
 
     pub(super) fn remedy(self) -> String {
-        format!("leave out {}, which the local solver does not have, or thin the cloud", self.name)
+        format!("leave out {}, which the local solver cannot compute, or thin the cloud", self.name)
     }
 }
 
 pub(super) const TRY_LOCAL: &str =
     "set \"solver\" to \"local\", which takes time in proportion to the points, or thin the cloud";
 
-/// Returns 422 for matrices of operators with the local solver. They need one function for all queries.
+/// Returns 422 for dense matrices of operators with the local solver. They need one function for all queries.
 pub(super) fn local_lacks_operators(pointer: &str) -> Problem {
-    let detail = "operators take values of one function, which the local solver does not have: take \"solver\": \"dense\", and \
-                  {\"geometry\": {\"surface\": \"local\"}} for the surface under an operator";
+    let detail = "a dense matrix needs one function of all values, which the local solver does not have: set \"solver\": \
+                  \"dense\", with \"geometry\": {\"surface\": \"local\"} for a local surface, or ask for the sparse matrix at \
+                  /v1/laplace-beltrami/sparse-matrix or /v1/surface-gradient/sparse-matrix";
     Problem::of_field(Slug::UnsupportedBySolver, pointer, detail)
 }
 
 /// Returns 422 for what only local regressions have, at the surface of another solver.
 pub(super) fn only_local_learns(member: &str) -> Problem {
     let detail =
-        format!("only local regressions have {member}: leave them out, or take \"solver\": \"local\"");
+        format!("only local regressions take {member}: leave them out, or set \"solver\": \"local\"");
     Problem::of_field(Slug::UnsupportedBySolver, format!("/{member}"), detail)
 }
 
@@ -115,7 +116,7 @@ impl FitOptions {
         let refuse = |error| Problem::from_numerics(error, on.pointers);
         match (self.alpha, self.noise_variances) {
             (Some(_), Some(_)) => {
-                let detail = "noise_variances stands instead of alpha; give one of them";
+                let detail = "alpha and noise_variances exclude each other; give one of them";
                 Err(Problem::invalid_request(on.pointers.regularization, detail))
             }
             (None, None) => Ok(None),

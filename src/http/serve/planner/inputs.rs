@@ -53,7 +53,7 @@ impl Planner<'_> {
             return Err(dimension_mismatch("/sites", cloud.dimension(), &sites));
         }
         if let Some(site) = first_elsewhere(&sites, cloud) {
-            let detail = format!("site {site} is none of the points of the cloud");
+            let detail = format!("site {site} is not a point of the cloud");
             return Err(Problem::invalid_request(format!("/sites/{site}"), detail));
         }
         Ok(Arc::new(sites))
@@ -79,7 +79,7 @@ impl Planner<'_> {
             return Ok(n_numbers);
         }
         Err(Problem::too_large(Slug::ProblemTooLarge, "bytes of answer", limit, Some(required)).with_remedy(
-            "split the queries over several requests, or ask for fewer members: the factorization is kept for the next one \
+            "split the queries over several requests, or ask for fewer members: the cached factorization serves all of them \
              (operators raise the limit by GRAMIAN_MAX_RESPONSE_BYTES)",
         ))
     }
@@ -92,7 +92,7 @@ impl Planner<'_> {
         match (cloud.id, cloud.points) {
             (Some(id), None) => {
                 if cloud.normals.is_some() {
-                    let detail = "normals are given with points, not with an id";
+                    let detail = "normals can only be given with points, not with an id";
                     return Err(Problem::invalid_request(format!("{pointer}/normals"), detail));
                 }
                 let found = CloudId::parse(&id).and_then(|id| self.registered(id));
@@ -100,7 +100,7 @@ impl Planner<'_> {
             }
             (None, Some(points)) => Ok(self.register(points, cloud.normals, pointer)?.0),
             (Some(_), Some(_)) | (None, None) => {
-                Err(Problem::invalid_request(pointer, "exactly one of id and points is needed"))
+                Err(Problem::invalid_request(pointer, "give exactly one of id and points"))
             }
         }
     }
@@ -264,9 +264,10 @@ fn check_normals(normals: Points, cloud: &Cloud, pointer: &str) -> Result<Cloud,
     match zero {
         None => Ok(normals),
         Some(row) => {
-            let detail = format!("normal {row} is zero and points nowhere");
-            Err(Problem::of_field(Slug::InvalidCloud, format!("{pointer}/{row}"), detail)
-                .with_remedy("leave out this point, or all normals: they are found from the points then"))
+            let detail = format!("normal {row} is zero");
+            Err(Problem::of_field(Slug::InvalidCloud, format!("{pointer}/{row}"), detail).with_remedy(
+                "leave out this point, or leave out all normals and they are estimated from the points",
+            ))
         }
     }
 }

@@ -139,7 +139,7 @@ impl<'a> Planner<'a> {
             (Some(sites), None) => Ok(Some(("sites", Learning::AtSites(self.sites(sites, cloud)?)))),
             (None, Some(given)) => Ok(Some(("hyperparameters", Learning::Known(Arc::new(given.plan()?))))),
             (Some(_), Some(_)) => {
-                let detail = "hyperparameters are learned at sites, or given; leave out one of them";
+                let detail = "sites and hyperparameters exclude each other; give one of them";
                 Err(Problem::invalid_request("/sites", detail))
             }
         }

@@ -140,14 +140,14 @@ const ONE_PER_POINT: &str =
     "send one per point of the cloud (operators raise the limit by GRAMIAN_MAX_POINTS)";
 const ONE_PER_COORDINATE: &str =
     "send one per coordinate of the points (operators raise the limit by GRAMIAN_MAX_DIMENSION)";
-const SPLIT_LISTS: &str = "split them over several requests: the factorization is kept for the next one, so that this costs nothing \
+const SPLIT_LISTS: &str = "split them over several requests: the cached factorization serves all of them \
                            (operators raise the limit by GRAMIAN_MAX_POINTS)";
-const SPLIT_QUERIES: &str = "split them over several requests: the factorization is kept for the next one, so that this costs nothing \
+const SPLIT_QUERIES: &str = "split them over several requests: the cached factorization serves all of them \
                              (operators raise the limit by GRAMIAN_MAX_QUERIES)";
 const FEWER_QUANTILES: &str =
-    "ask for fewer: they are those of normal distributions, whose means and variances say everything";
+    "ask for fewer: the distributions are normal, so means and variances determine every quantile";
 const THIN: &str =
-    "thin the cloud, or cut it into parts that overlap (operators raise the limit by GRAMIAN_MAX_POINTS)";
+    "thin the cloud, or cut it into overlapping parts (operators raise the limit by GRAMIAN_MAX_POINTS)";
 const COST_OF_DENSE: &str =
     "it takes 4 n² bytes and n³/3 flops (operators raise the limit by GRAMIAN_MAX_DENSE_POINTS)";
 const PROJECT: &str =
@@ -181,7 +181,7 @@ pub fn too_many_coordinates(limit: usize, required: usize, n_rows: usize) -> Pro
 
 fn too_many_sites(limit: usize, required: usize) -> Problem {
     Problem::too_large(Slug::ProblemTooLarge, "sites", limit, Some(required))
-        .with_remedy("send some of them, spread over the surface: more would say the same")
+        .with_remedy("send a sample of them, spread over the surface: more would not change the estimates")
 }
 
 /// The remedy for a client whose rows are columns.

@@ -64,7 +64,7 @@ impl Objects {
         let found = self.open_pieces(&self.job(owner, id, REQUEST)).await?;
         let read = |found: Found| {
             let request = serde_json::from_slice(&found.line);
-            let request = request.map_err(|_| Damaged("its first line is no request"))?;
+            let request = request.map_err(|_| Damaged("its first line is not a request"))?;
             Ok(FoundRequest { request, n_body_bytes: found.n_body_bytes, body: found.body })
         };
         Ok(found.map(|found| found.and_then(read)))
@@ -73,6 +73,6 @@ impl Objects {
     /// Counts and logs a damaged request, whose job then fails.
     pub fn report_job(&self, owner: &OwnerName, id: JobId) {
         let name = self.job(owner, id, REQUEST);
-        self.report(&name, Damaged("its bytes are not those that were written"));
+        self.report(&name, Damaged("its checksum does not match"));
     }
 }

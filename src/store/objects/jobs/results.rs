@@ -126,7 +126,7 @@ impl Objects {
         };
         let Some((ended_at, bytes)) = self.counted(Verb::Read, &name, found.await)? else { return Ok(None) };
         let read = unsealed(&bytes).and_then(|line| {
-            serde_json::from_slice(line).map_err(|_| Damaged("its first line is no result"))
+            serde_json::from_slice(line).map_err(|_| Damaged("its first line is not a result"))
         });
         let damaged = match read {
             Ok(Published { head, attempt: None }) => {
@@ -145,7 +145,7 @@ impl Objects {
                         }));
                     }
                     Some(Err(damaged)) => damaged,
-                    None => Damaged("its body is not there"),
+                    None => Damaged("its body is missing"),
                 }
             }
             Err(damaged) => damaged,
@@ -168,9 +168,7 @@ impl Objects {
             let (objects, owner) = (self.clone(), owner.clone());
             async move {
                 if let Err(BrokenOff::Damaged) = piece {
-                    objects
-                        .drop_result(&owner, id, Damaged("its bytes are not those that were written"))
-                        .await;
+                    objects.drop_result(&owner, id, Damaged("its checksum does not match")).await;
                 }
                 piece
             }
@@ -183,6 +181,6 @@ impl Objects {
         let name = self.job(owner, id, RESULT);
         self.report(&name, damaged);
         let is_gone = self.delete(&name).await.is_ok() && self.mark_open(owner, id).await.is_ok();
-        tracing::error!(job = %id, is_gone, "the result of a job is damaged, and made again");
+        tracing::error!(job = %id, is_gone, "the stored result of a job is damaged and is computed again");
     }
 }

@@ -37,7 +37,7 @@ impl<'a> Tiling<'a> {
             [&region.centre, &region.normal, &region.lower, &region.upper].iter().all(|row| row.len() == d)
         };
         if let Some((tile, _)) = all().find(|(_, region)| !of_dimension(region)) {
-            let requirement = "has a region whose rows have another length than those of others";
+            let requirement = "has a region whose rows differ in length from those of other regions";
             return Err(NumericsError::InvalidTile { tile, requirement });
         }
         let leads_out = |tile: &TileRegions| {
@@ -46,7 +46,7 @@ impl<'a> Tiling<'a> {
         if let Some(tile) = tiles.iter().position(leads_out) {
             return Err(NumericsError::InvalidTile {
                 tile,
-                requirement: "has a border of a region that it lacks",
+                requirement: "has a border of a region that is not in its list",
             });
         }
         let leads_nowhere = |link: &[usize; 2]| link.iter().any(|&region| region >= n_regions);

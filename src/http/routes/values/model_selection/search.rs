@@ -30,7 +30,7 @@ use gramian_numerics::solver::trend::Trend;
 use gramian_numerics::sums::regularization::Regularization;
 
 const BEYOND_KERNELS: &str =
-    "the variance of the values is beyond what kernels take, 1e-140 to 1e140; scale the values";
+    "the variance of the values is outside the range of kernels, 1e-140 to 1e140; scale the values";
 
 /// Default number of further starts.
 const RESTARTS: u8 = 2;
@@ -76,11 +76,11 @@ impl Search {
         check_seed(request.seed.unwrap_or_default(), "/seed")?;
         let families = request.families.clone().unwrap_or_default();
         if let Some(at) = (1..families.len()).find(|&at| families[..at].contains(&families[at])) {
-            return Err(Problem::invalid_request(format!("/families/{at}"), "a family is tried once"));
+            return Err(Problem::invalid_request(format!("/families/{at}"), "list each family once"));
         }
         let vary = request.vary.as_deref().unwrap_or_default();
         if vary.len() > MAX_VARY {
-            let detail = format!("vary has {} entries, {MAX_VARY} are the most", vary.len());
+            let detail = format!("vary has {} entries; at most {MAX_VARY} are allowed", vary.len());
             return Err(Problem::invalid_request("/vary", detail));
         }
         check_axes(vary)?;

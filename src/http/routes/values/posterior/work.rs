@@ -84,7 +84,7 @@ impl Asked {
         match quantiles.enumerate().find(|(_, p)| !(**p > 0.0 && **p < 1.0)) {
             None => Ok(()),
             Some((at, p)) => {
-                let detail = format!("a quantile is that of a probability between 0 and 1, found {p}");
+                let detail = format!("quantiles need probabilities between 0 and 1, found {p}");
                 Err(Problem::invalid_request(format!("/quantiles/{at}"), detail))
             }
         }

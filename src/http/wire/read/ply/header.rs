@@ -108,7 +108,7 @@ fn read_line<'a>(
     match words[..] {
         ["end_header"] => return Ok(true),
         ["format", name, version] if encoding.is_none() => *encoding = Some(format_of(name, version)?),
-        ["format", ..] if encoding.is_some() => return Err("the format is said twice".to_owned()),
+        ["format", ..] if encoding.is_some() => return Err("the format is given twice".to_owned()),
         ["element", name, count] => elements.push(element_of(name, count, elements)?),
         ["property", ..] => {
             let element = elements.last_mut().ok_or("it belongs to no element")?;
@@ -141,7 +141,7 @@ fn element_of<'a>(name: &'a str, count: &str, known: &[Element<'a>]) -> Result<E
     }
     let is_plain = count.bytes().all(|digit| digit.is_ascii_digit());
     let count = count.parse().ok().filter(|_| is_plain);
-    let count = count.ok_or_else(|| format!("element {:?} has no count that there could be", shown(name)))?;
+    let count = count.ok_or_else(|| format!("element {:?} has an impossible count", shown(name)))?;
     Ok(Element { name, count, properties: Vec::new() })
 }
 
