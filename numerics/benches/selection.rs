@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Stage;
-use gramian_numerics::selection::{Criterion, Hyperparameters, alpha_path, default_alphas};
+use gramian_numerics::selection::{Criterion, Hyperparameters, Observations, alpha_path, default_alphas};
 use gramian_numerics::solver::trend::Mean;
 use gramian_numerics::sums::regularization::Regularization;
 use support::common::clouds::{fibonacci_sphere, waves};
@@ -34,7 +34,8 @@ fn main() {
         for mean in [Mean::Zero, Mean::Linear] {
             let round = || {
                 let (stopwatch, began) = (Stopwatch::default(), Instant::now());
-                alpha_path((&cloud, &values, mean), &at, &alphas, criterion, &stopwatch).unwrap();
+                let data = Observations { cloud: &cloud, values: &values, mean };
+                alpha_path(data, &at, &alphas, criterion, &stopwatch).unwrap();
                 let whole = began.elapsed().as_secs_f64();
                 (whole, stopwatch.time(Stage::Factor, Instant::now()).as_secs_f64())
             };

@@ -10,7 +10,7 @@ use gramian_numerics::kernel::Family;
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::selection::{
-    Criterion, Hyperparameters, MAX_EVALUATIONS, Parameter, Selection, Variation, select,
+    Criterion, Hyperparameters, MAX_EVALUATIONS, Observations, Parameter, Selection, Variation, select,
 };
 use gramian_numerics::solver::trend::Mean;
 use gramian_numerics::sums::regularization::Regularization;
@@ -51,9 +51,7 @@ fn main() {
     ]
     .map(|(parameter, [min, max])| Variation { parameter, min, max });
     let asked = Selection {
-        cloud: &cloud,
-        values: &values,
-        mean: Mean::Zero,
+        observations: Observations { cloud: &cloud, values: &values, mean: Mean::Zero },
         criterion: Criterion::MarginalLikelihood,
         start: &start,
         vary: &vary,

@@ -16,6 +16,13 @@ const ROUNDING: f64 = 64.0;
 /// Draws computed at once.
 const DRAWS_PER_BLOCK: usize = 256;
 
+/// Identity of a sequence of draws: a seed, and which of several lists of values the draws are for.
+#[derive(Debug, Clone, Copy)]
+pub struct Stream {
+    pub seed: u64,
+    pub list: u64,
+}
+
 /// A root L of a covariance `C ≈ LLᵀ`, `[m, m]`, with the rank that it has in float64.
 pub struct Root {
     /// The r independent directions, `[r, m]` row by row.
@@ -54,7 +61,7 @@ impl Root {
 
     /// Draws `[count, m]` about means `[m]`.
     ///
-    /// A draw depends on the seed, the list and its index in the list, but not on `count`.
+    /// A draw depends on the stream and its index in the stream, but not on `count`.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -62,7 +69,7 @@ impl Root {
         &self,
         means: &[f64],
         count: usize,
-        (seed, list): (u64, u64),
+        stream: Stream,
         observer: &dyn Observer,
     ) -> Result<Vec<f64>> {
         let m = self.n_queries;
@@ -75,7 +82,7 @@ impl Root {
             let (first, count) = (block * DRAWS_PER_BLOCK, draws.len() / m);
             let normals = &mut normals[..rank * count];
             for (draw, numbers) in normals.chunks_exact_mut(rank.max(1)).enumerate() {
-                Random::of(seed, (list << 32) ^ (first + draw) as u64).fill_normal(numbers);
+                Random::of(stream.seed, (stream.list << 32) ^ (first + draw) as u64).fill_normal(numbers);
             }
             let out = MatMut::from_column_major_slice_mut(draws, m, count);
             let normals = MatRef::from_column_major_slice(normals, rank, count);
@@ -114,8 +121,8 @@ mod tests {
             let covariance = covariance(&solver, &queries, &Unobserved).unwrap();
             let root = Root::of(&covariance, kernel.at_zero(), &Unobserved).unwrap();
             let means: Vec<f64> = (0..m).map(|i| i as f64).collect();
-            let draws = root.draw(&means, count, (3, 0), &Unobserved).unwrap();
-            let few = root.draw(&means, 5, (3, 0), &Unobserved).unwrap();
+            let draws = root.draw(&means, count, Stream { seed: 3, list: 0 }, &Unobserved).unwrap();
+            let few = root.draw(&means, 5, Stream { seed: 3, list: 0 }, &Unobserved).unwrap();
             assert_eq!(few, draws[..5 * m], "a draw does not depend on the others");
             let at = |draw: usize, query: usize| draws[draw * m + query] - means[query];
             for i in 0..m {
@@ -137,7 +144,7 @@ mod tests {
         for variance in [0.0, 1e-17] {
             let covariance = Covariance { latent: vec![0.0, 0.0, 0.0, variance], clamped: vec![0] };
             let root = Root::of(&covariance, 1.0, &Unobserved).unwrap();
-            let draws = root.draw(&[1.0, 2.0], 2, (0, 0), &Unobserved).unwrap();
+            let draws = root.draw(&[1.0, 2.0], 2, Stream { seed: 0, list: 0 }, &Unobserved).unwrap();
             assert_eq!(draws, [1.0, 2.0, 1.0, 2.0]);
         }
     }

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::criterion::Criterion;
 use super::evaluation::{Evaluator, UNDETERMINED, never_definite};
 use super::parameters::Hyperparameters;
-use super::subject::Subject;
+use super::subject::{Observations, Subject};
 use crate::error::{NumericsError, Result};
 use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
@@ -92,11 +92,12 @@ pub fn leave_one_out(
 /// [`NumericsError::MeanNotDetermined`] if all points together do not determine the mean. Also the errors of
 /// [`Hyperparameters::kernel_on`].
 pub fn leave_one_out_with(
-    (cloud, values, mean): (&Cloud, &[f64], Mean),
+    observations: Observations<'_>,
     at: &Hyperparameters,
     observer: &dyn Observer,
 ) -> Result<LeaveOneOut> {
-    let subject = Subject::of(cloud, values, mean)?;
+    let Observations { cloud, values, .. } = observations;
+    let subject = Subject::of(observations)?;
     at.noise.check_matches(cloud)?;
     observer.enter(Stage::Factor);
     let mut evaluator = Evaluator::new(&subject, Criterion::LeaveOneOut, false);

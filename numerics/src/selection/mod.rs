@@ -20,5 +20,8 @@ pub use criterion::Criterion;
 pub use learning::{Learned, Noise, Observed, learn, learn_mean, learning_price};
 pub use leave_one_out::{LeaveOneOut, leave_one_out, leave_one_out_with};
 pub use parameters::{Hyperparameters, Parameter, Variation};
-pub use price::{alpha_path_price, expected_evaluations, leave_one_out_price, selection_price};
+pub use price::{
+    CloudSize, SearchSize, alpha_path_price, expected_evaluations, leave_one_out_price, selection_price,
+};
 pub use search::{MAX_EVALUATIONS, Selected, Selection, Side, select};
+pub use subject::Observations;

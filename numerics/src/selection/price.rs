@@ -11,20 +11,34 @@ pub fn expected_evaluations(n_free: usize) -> usize {
     if n_free == 0 { 1 } else { 40 + 6 * n_free }
 }
 
-/// Returns the cost of `n_evaluations` evaluations.
+/// Points and coordinates of a cloud.
+#[derive(Debug, Clone, Copy)]
+pub struct CloudSize {
+    pub n_points: usize,
+    pub dimension: usize,
+}
+
+/// Extent of a search.
+#[derive(Debug, Clone, Copy)]
+pub struct SearchSize {
+    /// Free numbers of each descent.
+    pub n_free: usize,
+    /// Evaluations of all descents.
+    pub n_evaluations: usize,
+    /// Families times starts.
+    pub n_descents: usize,
+    pub n_threads: usize,
+}
+
+/// Returns the cost of a search.
 ///
 /// With all slopes, an evaluation takes n³ flops for the likelihood and 2n³ for other criteria. Without
 /// slopes it takes a third of that. A pass over the pairs is added.
 ///
-/// `n_descents` is the number of families times starts. Descents of up to 1,024 points run side by side on
-/// `n_threads`, each with memory of its own.
-pub fn selection_price(
-    (n_points, dimension): (usize, usize),
-    criterion: Criterion,
-    n_free: usize,
-    n_evaluations: usize,
-    (n_descents, n_threads): (usize, usize),
-) -> Price {
+/// Descents of up to 1,024 points run side by side on the threads, each with memory of its own.
+pub fn selection_price(cloud: CloudSize, criterion: Criterion, search: SearchSize) -> Price {
+    let CloudSize { n_points, dimension } = cloud;
+    let SearchSize { n_free, n_evaluations, n_descents, n_threads } = search;
     let (n, d) = (n_points as f64, dimension as f64);
     let cubes = match criterion {
         Criterion::MarginalLikelihood if n_free == 0 => 1.0 / 3.0,
@@ -45,13 +59,15 @@ pub fn selection_price(
 /// Returns the cost of a path over `n_alphas` values of α. Either it takes one eigendecomposition, with
 /// matrix products where the score needs the diagonal of the inverse, or a factorization for each α.
 pub fn alpha_path_price(
-    (n_points, dimension): (usize, usize),
+    cloud: CloudSize,
     criterion: Criterion,
     n_functions: usize,
     n_alphas: usize,
 ) -> Price {
+    let CloudSize { n_points, dimension } = cloud;
     if !is_decomposed(n_points, n_alphas) {
-        return selection_price((n_points, dimension), criterion, 0, n_alphas, (1, 1));
+        let one_by_one = SearchSize { n_free: 0, n_evaluations: n_alphas, n_descents: 1, n_threads: 1 };
+        return selection_price(cloud, criterion, one_by_one);
     }
     let (n, d, m, p) = (n_points as f64, dimension as f64, n_alphas as f64, n_functions as f64);
     let each = match criterion {
@@ -86,15 +102,18 @@ mod tests {
     fn more_of_anything_never_costs_less() {
         let criteria =
             [Criterion::MarginalLikelihood, Criterion::LeaveOneOut, Criterion::GeneralizedCrossValidation];
+        let search = |n_evaluations| SearchSize { n_free: 4, n_evaluations, n_descents: 6, n_threads: 2 };
         for criterion in criteria {
             for (few, many) in [(10, 100), (100, 3000), (3000, 1 << 40)] {
-                let price = |n: usize| selection_price((n, 3), criterion, 4, n, (6, 2));
-                let path = |n: usize| alpha_path_price((n, 3), criterion, 4, n);
+                let cloud = |n_points| CloudSize { n_points, dimension: 3 };
+                let price = |n: usize| selection_price(cloud(n), criterion, search(n));
+                let path = |n: usize| alpha_path_price(cloud(n), criterion, 4, n);
                 for (small, large) in [(price(few), price(many)), (path(few), path(many))] {
                     assert!(small.flops < large.flops && small.n_bytes < large.n_bytes);
                 }
             }
         }
-        assert_eq!(selection_price((1 << 40, 3), Criterion::LeaveOneOut, 4, 1, (1, 1)).n_bytes, usize::MAX);
+        let huge = CloudSize { n_points: 1 << 40, dimension: 3 };
+        assert_eq!(selection_price(huge, Criterion::LeaveOneOut, search(1)).n_bytes, usize::MAX);
     }
 }

@@ -12,7 +12,16 @@ use crate::sums::regularization::Regularization;
 /// Least difference between 1 and a leverage. Less is rounding.
 const LEVERAGE: f64 = 1e-10;
 
-/// Values at the points of a cloud with a mean. All evaluations share them.
+/// Values at the points of a cloud, and the mean of the process that they are explained by.
+#[derive(Debug, Clone, Copy)]
+pub struct Observations<'a> {
+    pub cloud: &'a Cloud,
+    /// Y, `[n]`, unit V.
+    pub values: &'a [f64],
+    pub mean: Mean,
+}
+
+/// Observations prepared for evaluations, which all share them.
 pub(super) struct Subject<'a> {
     pub(super) cloud: &'a Cloud,
     /// Values, `[n]`. If there is a mean, their average is subtracted.
@@ -25,12 +34,13 @@ pub(super) struct Subject<'a> {
 }
 
 impl<'a> Subject<'a> {
-    /// Prepares values at the points of a cloud.
+    /// Prepares observations.
     ///
     /// # Errors
     /// [`NumericsError::LengthMismatch`]. [`NumericsError::MeanNotDetermined`] if the points do not
     /// distinguish the functions of the mean, or if there are no more points than functions.
-    pub(super) fn of(cloud: &'a Cloud, values: &[f64], mean: Mean) -> Result<Self> {
+    pub(super) fn of(observations: Observations<'a>) -> Result<Self> {
+        let Observations { cloud, values, mean } = observations;
         cloud.check_one_per_point(values)?;
         let (n, basis) = (values.len(), Basis::of(mean, cloud));
         let (functions, p) = (basis.columns(cloud), basis.n_functions());

@@ -11,8 +11,8 @@ use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling as Spacings;
 use gramian_numerics::selection::{
-    Criterion, Hyperparameters, MAX_EVALUATIONS, Noise, Observed, Parameter, Selection, Variation, learn,
-    select,
+    Criterion, Hyperparameters, MAX_EVALUATIONS, Noise, Observations, Observed, Parameter, Selection,
+    Variation, learn, select,
 };
 use gramian_numerics::solver::trend::Mean;
 use gramian_numerics::solver::{Solver, System};
@@ -152,9 +152,7 @@ fn chosen(by: By, cloud: &Cloud, values: &[f64]) -> Chosen {
         free(Parameter::Alpha, 1e-10 * learned.variance, 10.0 * learned.variance),
     ];
     let selection = Selection {
-        cloud,
-        values,
-        mean,
+        observations: Observations { cloud, values, mean },
         criterion,
         start: &start,
         vary: &vary,

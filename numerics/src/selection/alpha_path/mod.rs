@@ -24,7 +24,7 @@ use crate::points::cloud::Cloud;
 use crate::selection::criterion::{Criterion, Parts};
 use crate::selection::evaluation::Evaluator;
 use crate::selection::parameters::Hyperparameters;
-use crate::selection::subject::Subject;
+use crate::selection::subject::{Observations, Subject};
 use crate::solver::trend::{Mean, solve_gram};
 use crate::sums::regularization::Regularization;
 use spectrum::Spectrum;
@@ -52,7 +52,7 @@ pub(super) fn is_decomposed(n_points: usize, n_alphas: usize) -> bool {
 /// `NumericsError::LengthMismatch`, `NumericsError::MeanNotDetermined`, `NumericsError::Cancelled`.
 /// Also the errors of [`Hyperparameters::kernel_on`].
 pub fn alpha_path(
-    (cloud, values, mean): (&Cloud, &[f64], Mean),
+    observations: Observations<'_>,
     at: &Hyperparameters,
     alphas: &[f64],
     criterion: Criterion,
@@ -61,8 +61,8 @@ pub fn alpha_path(
     for &alpha in alphas {
         Regularization::uniform(alpha)?;
     }
-    let path = Path { subject: Subject::of(cloud, values, mean)?, at, alphas, criterion };
-    if is_decomposed(cloud.n_points(), alphas.len()) {
+    let path = Path { subject: Subject::of(observations)?, at, alphas, criterion };
+    if is_decomposed(observations.cloud.n_points(), alphas.len()) {
         path.by_spectrum(observer)
     } else {
         path.by_factors(observer)

@@ -28,12 +28,12 @@ fn every_alpha_has_the_score_that_it_has_alone() {
     // More α than are handled together.
     let alphas = default_alphas(70, &kernel, 300);
     for mean in [Mean::Zero, Mean::Constant, Mean::Linear] {
-        let subject = Subject::of(&cloud, &values, mean).unwrap();
+        let data = Observations { cloud: &cloud, values: &values, mean };
+        let subject = Subject::of(data).unwrap();
         for criterion in CRITERIA {
-            let path =
-                alpha_path((&cloud, &values, mean), &at(9.0), &alphas, criterion, &Unobserved).unwrap();
+            let path = alpha_path(data, &at(9.0), &alphas, criterion, &Unobserved).unwrap();
             assert_eq!(path.len(), 300);
-            let own = Subject::of(&cloud, &values, mean).unwrap();
+            let own = Subject::of(data).unwrap();
             let few = Path { subject: own, at: &at(9.0), alphas: &alphas[..3], criterion };
             let by_factors = few.by_factors(&Unobserved).unwrap();
             assert!(path.iter().zip(&by_factors).all(|(a, b)| (a - b).abs() < 1e-8 * b.abs()));
@@ -55,7 +55,7 @@ fn matrices_that_are_not_definite_have_no_score() {
     let cloud = Cloud::new(vec![0.0, 0.0, 1.0, 2.0], 1).unwrap();
     let kernel = Hyperparameters { length_scales: vec![1.0], ..at(0.0) };
     for criterion in CRITERIA {
-        let data = (&cloud, &[1.0, 2.0, 3.0, 4.0][..], Mean::Zero);
+        let data = Observations { cloud: &cloud, values: &[1.0, 2.0, 3.0, 4.0], mean: Mean::Zero };
         let path = alpha_path(data, &kernel, &[0.0, 0.1], criterion, &Unobserved).unwrap();
         assert!(path[0].is_nan() && path[1].is_finite(), "{path:?}");
         let refused = alpha_path(data, &kernel, &[-1.0], criterion, &Unobserved);

@@ -7,6 +7,7 @@ use crate::kernel::Family;
 use crate::observer::Unobserved;
 use crate::points::cloud::Cloud;
 use crate::selection::parameters::{Parameter, Variation};
+use crate::selection::subject::Observations;
 use crate::solver::trend::Mean;
 use crate::solver::{Solution, Solver, System};
 use crate::sums::regularization::Regularization;
@@ -69,7 +70,7 @@ fn slopes_of_every_family_and_criterion_agree_with_differences() {
     let cloud = cube(40, 3, random);
     let values = values(&cloud, random);
     for mean in [Mean::Zero, Mean::Constant, Mean::Linear] {
-        let subject = Subject::of(&cloud, &values, mean).unwrap();
+        let subject = Subject::of(Observations { cloud: &cloud, values: &values, mean }).unwrap();
         for family in all_families() {
             for criterion in CRITERIA {
                 let mut base = Hyperparameters {
@@ -97,7 +98,7 @@ fn slopes_of_many_points_and_of_one_axis_agree_with_differences() {
     // More than one block and more than one task.
     let cloud = cube(300, 4, random);
     let values = values(&cloud, random);
-    let subject = Subject::of(&cloud, &values, Mean::Constant).unwrap();
+    let subject = Subject::of(Observations { cloud: &cloud, values: &values, mean: Mean::Constant }).unwrap();
     let base = Hyperparameters {
         family: Family::Matern { order: 2 },
         length_scales: vec![1.2],
@@ -132,7 +133,7 @@ fn likelihood_and_mean_are_those_of_the_solver() {
                 variance: 2.0,
                 noise,
             };
-            let subject = Subject::of(&cloud, &values, mean).unwrap();
+            let subject = Subject::of(Observations { cloud: &cloud, values: &values, mean }).unwrap();
             let mut evaluator = Evaluator::new(&subject, Criterion::MarginalLikelihood, false);
             let found = evaluator.score(&at, &Unobserved).unwrap().unwrap().score;
             let (solver, solution) = solved(&cloud, &values, mean, &at);
@@ -161,7 +162,7 @@ fn cross_validation_is_that_of_the_hat_matrix() {
                 variance: 2.0,
                 noise: noise.clone(),
             };
-            let subject = Subject::of(&cloud, &values, mean).unwrap();
+            let subject = Subject::of(Observations { cloud: &cloud, values: &values, mean }).unwrap();
             let found = score(&subject, Criterion::GeneralizedCrossValidation, &at);
             let smoothed = |values: &[f64]| -> Vec<f64> {
                 let (_, solution) = solved(&cloud, values, mean, &at);
@@ -187,12 +188,13 @@ fn matrices_that_are_not_definite_have_no_score_and_too_few_points_no_mean() {
         variance: 1.0,
         noise: Regularization::Uniform(0.0),
     };
-    let subject = Subject::of(&cloud, &[1.0, 2.0, 3.0], Mean::Zero).unwrap();
+    let subject =
+        Subject::of(Observations { cloud: &cloud, values: &[1.0, 2.0, 3.0], mean: Mean::Zero }).unwrap();
     for criterion in CRITERIA {
         let found = Evaluator::new(&subject, criterion, false).score(&at, &Unobserved).unwrap();
         assert!(found.is_none());
     }
     let pair = Cloud::new(vec![0.0, 1.0], 1).unwrap();
-    let refused = Subject::of(&pair, &[1.0, 2.0], Mean::Linear).err();
+    let refused = Subject::of(Observations { cloud: &pair, values: &[1.0, 2.0], mean: Mean::Linear }).err();
     assert_eq!(refused, Some(NumericsError::MeanNotDetermined));
 }

@@ -93,7 +93,8 @@ fn both_ways_agree_and_a_factor_scales_variances_alone() {
         let (solver, solution) = solved(&cloud, &values, Mean::Linear, noise.clone());
         let found = leave_one_out(&solver, &solution, &values, 1.0, &Unobserved).unwrap();
         let at = Hyperparameters::of(solver.kernel(), noise);
-        let again = leave_one_out_with((&cloud, &values, Mean::Linear), &at, &Unobserved).unwrap();
+        let data = Observations { cloud: &cloud, values: &values, mean: Mean::Linear };
+        let again = leave_one_out_with(data, &at, &Unobserved).unwrap();
         let scaled = leave_one_out(&solver, &solution, &values, 4.0, &Unobserved).unwrap();
         for i in 0..N {
             assert!((found.means[i] - again.means[i]).abs() < 1e-10);

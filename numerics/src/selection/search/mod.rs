@@ -14,7 +14,7 @@ use crate::selection::criterion::Criterion;
 use crate::selection::evaluation::space::Space;
 use crate::selection::evaluation::{Evaluator, never_definite};
 use crate::selection::parameters::{Hyperparameters, Parameter, Variation};
-use crate::selection::subject::Subject;
+use crate::selection::subject::{Observations, Subject};
 use crate::solver::trend::{Mean, Trend};
 pub use descent::Side;
 use descent::{descend, finish, side};
@@ -30,10 +30,7 @@ pub(super) const SIDE_BY_SIDE: usize = 1024;
 /// A search: the data, the criterion, and the range of hyperparameters.
 #[derive(Debug, Clone, Copy)]
 pub struct Selection<'a> {
-    pub cloud: &'a Cloud,
-    /// Y, `[n]`, unit V.
-    pub values: &'a [f64],
-    pub mean: Mean,
+    pub observations: Observations<'a>,
     pub criterion: Criterion,
     /// Start of the search. Hyperparameters that do not vary keep these values.
     pub start: &'a Hyperparameters,
@@ -84,8 +81,8 @@ pub struct Selected {
 /// the points. [`NumericsError::NotPositiveDefinite`] if the matrix is not positive definite at any start.
 /// [`NumericsError::Cancelled`], and the errors of [`Hyperparameters::kernel_on`].
 pub fn select(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Selected> {
-    let Selection { cloud, vary, start, .. } = *selection;
-    let subject = Subject::of(cloud, selection.values, selection.mean)?;
+    let Selection { observations, vary, start, .. } = *selection;
+    let (subject, cloud) = (Subject::of(observations)?, observations.cloud);
     start.noise.check_matches(cloud)?;
     if selection.criterion == Criterion::LeaveOneOut {
         subject.check_without_one()?;

@@ -33,9 +33,7 @@ fn selection<'a>(
     vary: &'a [Variation],
 ) -> Selection<'a> {
     Selection {
-        cloud,
-        values,
-        mean: Mean::Zero,
+        observations: Observations { cloud, values, mean: Mean::Zero },
         criterion: Criterion::MarginalLikelihood,
         start,
         vary,

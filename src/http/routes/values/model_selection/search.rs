@@ -22,9 +22,9 @@ use gramian_numerics::kernel::{Family, Kernel, MAX_MATERN_ORDER, WendlandSmoothn
 use gramian_numerics::machine::price::Price;
 use gramian_numerics::model::Report;
 use gramian_numerics::selection::{
-    Criterion, Hyperparameters, LeaveOneOut, MAX_EVALUATIONS, Parameter, Selected, Selection, Variation,
-    alpha_path, alpha_path_price, default_alphas, expected_evaluations, leave_one_out_price,
-    leave_one_out_with, select, selection_price,
+    CloudSize, Criterion, Hyperparameters, LeaveOneOut, MAX_EVALUATIONS, Observations, Parameter, SearchSize,
+    Selected, Selection, Variation, alpha_path, alpha_path_price, default_alphas, expected_evaluations,
+    leave_one_out_price, leave_one_out_with, select, selection_price,
 };
 use gramian_numerics::solver::trend::Trend;
 use gramian_numerics::sums::regularization::Regularization;
@@ -127,17 +127,24 @@ impl Search {
             None => 2 + n_length_scales,
             Some(vary) => vary.iter().map(|free| if is_of_axes(free) { d } else { 1 }).sum(),
         };
-        let n_families = self.families.len().max(1) + self.orders.map_or(0, |(a, b)| 1 + usize::from(b - a));
-        let n_descents = n_families * (1 + self.restarts);
+        let n_descents = self.n_families() * (1 + self.restarts);
         let n_evaluations = n_descents * expected_evaluations(n_free);
-        let threads = (n_descents, rayon::current_num_threads());
-        let price = selection_price((n, d), self.criterion, n_free, n_evaluations, threads)
-            .and(leave_one_out_price(n, 1 + d));
+        let n_threads = rayon::current_num_threads();
+        let size = SearchSize { n_free, n_evaluations, n_descents, n_threads };
+        let cloud = CloudSize { n_points: n, dimension: d };
+        let price = selection_price(cloud, self.criterion, size).and(leave_one_out_price(n, 1 + d));
         if n <= MAX_PATH_POINTS {
-            price.and(alpha_path_price((n, d), self.criterion, 1 + d, N_ALPHAS))
+            price.and(alpha_path_price(cloud, self.criterion, 1 + d, N_ALPHAS))
         } else {
             price
         }
+    }
+
+    /// Returns the number of families to try, or one more where the start may be a Matérn kernel itself.
+    fn n_families(&self) -> usize {
+        let Some((least, most)) = self.orders else { return self.families.len().max(1) };
+        let n_others = self.families.iter().filter(|family| **family != KernelFamily::Matern).count();
+        n_others.max(usize::from(self.families.is_empty())) + usize::from(most - least) + 1
     }
 
     /// Returns the families to try. A family that is also that of the start keeps the parameters of the
@@ -274,9 +281,7 @@ impl Work {
         let merged = plan.merged(&values.list);
         let (cloud, mean) = (&*plan.fitted, plan.process.mean);
         let selection = Selection {
-            cloud,
-            values: &merged,
-            mean,
+            observations: Observations { cloud, values: &merged, mean },
             criterion: search.criterion,
             start: &start,
             vary: &vary,
@@ -295,7 +300,7 @@ impl Work {
             other => Problem::from_numerics(other, plan.pointers),
         };
         let selected = select(&selection, observer).map_err(refused)?;
-        let left_out = leave_one_out_with((cloud, &merged, mean), &selected.hyperparameters, observer);
+        let left_out = leave_one_out_with(selection.observations, &selected.hyperparameters, observer);
         let path = path(&selection, &selected.hyperparameters, observer).map_err(refused)?;
         let n_given = search.vary.as_ref().map_or(variations.len(), Vec::len);
         let mut gradient = vec![Nullable(None); n_given];
@@ -351,14 +356,15 @@ fn path(
     at: &Hyperparameters,
     observer: &JobObserver,
 ) -> Result<Vec<PathEntry>, NumericsError> {
-    let is_too_large = selection.cloud.n_points() > MAX_PATH_POINTS;
+    let is_too_large = selection.observations.cloud.n_points() > MAX_PATH_POINTS;
     if is_too_large || !matches!(at.noise, Regularization::Uniform(_)) {
         return Ok(Vec::new());
     }
-    let Selection { cloud, values, mean, criterion, .. } = *selection;
+    let Selection { observations, criterion, .. } = *selection;
+    let cloud = observations.cloud;
     let kernel = at.kernel_on(cloud)?;
     let alphas = default_alphas(cloud.n_points(), &kernel, N_ALPHAS);
-    let scores = alpha_path((cloud, values, mean), at, &alphas, criterion, observer)?;
+    let scores = alpha_path(observations, at, &alphas, criterion, observer)?;
     let entry = |(&alpha, score): (&f64, f64)| PathEntry {
         alpha,
         score: Nullable(Some(score).filter(|score| score.is_finite())),

@@ -20,7 +20,7 @@ use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::function::posterior::{
     Covariance, Variances, covariance_with_mean, log_marginal_likelihood,
 };
-use gramian_numerics::function::samples::Root;
+use gramian_numerics::function::samples::{Root, Stream};
 use gramian_numerics::machine::normal::{cumulative, quantile};
 use gramian_numerics::machine::price::Sizes;
 use gramian_numerics::model::price::{PosteriorAsked, posterior_price};
@@ -310,7 +310,7 @@ fn draws(
 ) -> Result<Vec<f64>, NumericsError> {
     let mut all = Vec::with_capacity(means.len() * count);
     for (list, means) in means.chunks_exact(m).enumerate() {
-        all.extend(root.draw(means, count, (seed, list as u64), observer)?);
+        all.extend(root.draw(means, count, Stream { seed, list: list as u64 }, observer)?);
     }
     Ok(all)
 }
