@@ -1,4 +1,4 @@
-//! Pages and probes of the process: problems, health, version, documents.
+//! Pages for people (root, problems, docs), probes and the version.
 
 use gramian::http::problem::slug::Slug;
 use serde_json::{Value, json};
@@ -16,43 +16,44 @@ async fn every_type_of_problem_has_a_page() {
         assert!(page.text.contains(slug.as_str()) && page.text.contains(slug.title()), "{}", page.text);
         assert!(page.text.contains(slug.status().as_str()));
     }
-    // Slugs of the contract in this version. None may be removed or renamed.
-    for slug in [
-        "malformed-json invalid-request invalid-cloud duplicate-points dimension-mismatch length-mismatch",
-        "kernel-not-smooth kernel-not-positive-definite not-positive-definite unsupported-by-solver unknown-cloud not-found",
-        "method-not-allowed not-acceptable unsupported-media-type body-too-large problem-too-large unauthorized",
+    // Slugs that clients may depend on. None may be removed or renamed; a new one is added here.
+    let slugs = [
+        "malformed-request malformed-json malformed-body invalid-request invalid-cloud duplicate-points",
+        "dimension-mismatch length-mismatch kernel-not-smooth kernel-not-positive-definite not-positive-definite",
+        "unsupported-by-solver unknown-cloud unknown-job not-found method-not-allowed not-acceptable",
+        "unsupported-media-type request-timeout body-too-large problem-too-large unauthorized rate-limited",
         "overloaded deadline-exceeded internal",
-    ]
-    .iter()
-    .flat_map(|line| line.split(' '))
-    {
+    ];
+    let slugs: Vec<&str> = slugs.iter().flat_map(|line| line.split(' ')).collect();
+    for slug in &slugs {
         assert!(Slug::parse(slug).is_some(), "{slug}");
     }
+    assert_eq!(slugs.len(), Slug::ALL.len());
 }
 
 #[tokio::test]
-async fn the_root_leads_to_all_that_is_served_for_people() {
+async fn the_root_page_links_to_every_page() {
     let server = Server::start().await;
     let page = server.get("/").await;
     assert_eq!(page.status, 200, "{}", page.text);
     assert!(page.header("content-type").starts_with("text/html"));
-    let sources = sources(&page);
-    for linked in ["docs/", "openapi.json", "openapi-3.0.json", "problems"] {
-        assert!(sources.iter().any(|source| source == linked), "{sources:?}");
+    let links = links(&page);
+    for path in ["docs/", "openapi.json", "openapi-3.0.json", "problems"] {
+        assert!(links.iter().any(|link| link == path), "{links:?}");
     }
-    for source in sources {
-        assert_eq!(server.get(&format!("/{source}")).await.status, 200, "{source}");
+    for link in links {
+        assert_eq!(server.get(&format!("/{link}")).await.status, 200, "{link}");
     }
 }
 
 #[tokio::test]
 async fn problems_are_listed_with_links_to_their_pages() {
     let server = Server::start().await;
-    let sources = sources(&server.get("/problems").await);
+    let links = links(&server.get("/problems").await);
     let expected: Vec<String> = Slug::ALL.iter().map(|slug| format!("problems/{}", slug.as_str())).collect();
-    assert_eq!(sources, expected);
-    for source in sources {
-        assert_eq!(server.get(&format!("/{source}")).await.status, 200, "{source}");
+    assert_eq!(links, expected);
+    for link in links {
+        assert_eq!(server.get(&format!("/{link}")).await.status, 200, "{link}");
     }
 }
 
@@ -75,19 +76,6 @@ async fn the_process_describes_itself() {
     }
 }
 
-/// Returns the values of all `src` and `href` attributes of a page.
-fn sources(page: &Answer) -> Vec<String> {
-    let mut found = Vec::new();
-    for attribute in ["src=", "href="] {
-        for rest in page.text.split(attribute).skip(1) {
-            let source = rest.trim_start_matches(['"', '\'']);
-            let end = source.find(['"', '\'', '>', ' ']).unwrap();
-            found.push(source[..end].to_owned());
-        }
-    }
-    found
-}
-
 #[tokio::test]
 async fn the_documentation_needs_no_other_host() {
     let server = Server::start().await;
@@ -96,15 +84,15 @@ async fn the_documentation_needs_no_other_host() {
         let page = server.get(path).await;
         assert_eq!(page.status, 200, "{path}");
         assert!(page.header("content-type").starts_with("text/html"));
-        let sources = sources(&page);
-        assert!(!sources.is_empty());
-        for source in sources {
-            assert!(!source.starts_with("//") && !source.contains("://"), "{source}");
-            let source = source.trim_start_matches("./");
-            let resolved =
-                if source.starts_with('/') { source.to_owned() } else { format!("/docs/{source}") };
+        let links = links(&page);
+        assert!(!links.is_empty());
+        for link in links {
+            assert!(!link.starts_with("//") && !link.contains("://"), "{link}");
+            let link = link.trim_start_matches("./");
+            let resolved = if link.starts_with('/') { link.to_owned() } else { format!("/docs/{link}") };
             let asset = server.get(&resolved).await;
             assert_eq!(asset.status, 200, "{resolved}");
+            // Swagger UI's start script: it must load this server's document, not the demo's.
             if resolved.ends_with("initializer.js") {
                 assert!(
                     asset.text.contains("/openapi.json") && !asset.text.contains("https://"),
@@ -114,4 +102,17 @@ async fn the_documentation_needs_no_other_host() {
             }
         }
     }
+}
+
+/// Returns the targets of all `src` and `href` attributes, as written.
+fn links(page: &Answer) -> Vec<String> {
+    let mut found = Vec::new();
+    for attribute in ["src=", "href="] {
+        for rest in page.text.split(attribute).skip(1) {
+            let link = rest.trim_start_matches(['"', '\'']);
+            let end = link.find(['"', '\'', '>', ' ']).unwrap();
+            found.push(link[..end].to_owned());
+        }
+    }
+    found
 }
