@@ -2,9 +2,9 @@
 //!
 //! WHY NOT A SEMAPHORE. A semaphore serves its waiters in order, so a request for a kilobyte waits behind one
 //! for a gigabyte. Here small reservations never wait behind large ones: a part of the budget is closed to
-//! large reservations. Among the large ones, those of the owner who holds least come first. Ties go by
-//! arrival. A reservation that its owner's share permits is never overtaken by a later one in this order, so
-//! each has its turn. With several owners, none may hold more than half.
+//! large reservations. Among the large ones, the owner holding least comes first; ties go by arrival. With
+//! several owners, none may hold more than half: a reservation beyond that is skipped until its owner gives
+//! bytes back. Any other is overtaken by a later one only if the owner of that one holds less.
 //!
 //! NO WAITING WHILE HOLDING. A caller that waits here must hold nothing that other waiters need. Callers
 //! therefore reserve all their bytes at once and split the reservation afterwards.
@@ -18,17 +18,17 @@ use tokio::sync::Notify;
 
 use super::{Owner, share_of_one};
 
-/// Divisor of the budget: large reservations leave `total / SMALL_SHARE` bytes free.
-const SMALL_SHARE: usize = 8;
+/// Large reservations leave `total / KEPT_FREE_DIVISOR` bytes free for small ones.
+const KEPT_FREE_DIVISOR: usize = 8;
 
-/// A reservation is small up to `1 / SMALL_PARTS` of the bytes that large ones leave free, so several fit.
-const SMALL_PARTS: usize = 16;
+/// A reservation of at most 1/16 of these bytes is small, so several fit into them.
+const SMALL_DIVISOR: usize = 16;
 
-/// Interval at which a waiting reservation looks again without being woken: caches may have become able to
-/// give up entries.
+/// Interval at which a waiting reservation looks again without being woken: a cache may be able to give up
+/// entries, and a turn that passes on is not announced.
 const LOOK_AGAIN: Duration = Duration::from_millis(50);
 
-/// A number of bytes, with a record of how many each owner holds.
+/// A limit on bytes held, with the bytes of each owner.
 pub struct Budget {
     ledger: Arc<Ledger>,
 }
@@ -99,8 +99,9 @@ impl Budget {
 
     /// Waits for the turn of this reservation and for `n_bytes` to be free, and reserves them.
     ///
-    /// While they are not, `look` is called with the shortage apart from the turn. It should release memory
-    /// that can be spared. If it breaks, the bytes are no longer wanted and the result is `None`.
+    /// Whenever they are not free, `look` is called with the missing bytes, `None` if only the turn is
+    /// missing. It should release what can be spared. `ControlFlow::Break` gives up, and the result is
+    /// `None`.
     ///
     /// # Errors
     /// [`BeyondBudget`] if `n_bytes` exceeds [`Budget::largest`].
@@ -117,6 +118,7 @@ impl Budget {
         loop {
             let released = self.ledger.released.notified();
             tokio::pin!(released);
+            // Registered before the check, so that a release in between is not missed.
             released.as_mut().enable();
             if let Some(reservation) = self.take_turn(&place) {
                 return Ok(Some(reservation));
@@ -139,6 +141,7 @@ impl Budget {
             loop {
                 let released = self.ledger.released.notified();
                 tokio::pin!(released);
+                // Registered before the check, as in `reserve`.
                 released.as_mut().enable();
                 if reservation.try_grow(n_bytes) {
                     return;
@@ -154,7 +157,7 @@ impl Budget {
         let state = self.ledger.state();
         let of_owner = state.of(owner).saturating_add(n_bytes).saturating_sub(self.ledger.share);
         let free = self.ledger.total.saturating_sub(state.held);
-        let of_all = (n_bytes + self.ledger.closed_to(n_bytes)).saturating_sub(free);
+        let of_all = n_bytes.saturating_add(self.ledger.must_leave_free(n_bytes)).saturating_sub(free);
         (of_owner > 0 || of_all > 0).then_some(Shortage { owner, of_owner, of_all })
     }
 
@@ -192,16 +195,16 @@ impl Ledger {
     }
 
     fn largest(&self) -> usize {
-        self.share.min(self.total - self.total / SMALL_SHARE)
+        self.share.min(self.total - self.total / KEPT_FREE_DIVISOR)
     }
 
     fn is_large(&self, n_bytes: usize) -> bool {
-        n_bytes > self.total / SMALL_SHARE / SMALL_PARTS
+        n_bytes > self.total / KEPT_FREE_DIVISOR / SMALL_DIVISOR
     }
 
     /// Bytes that a reservation of this size must leave free.
-    fn closed_to(&self, n_bytes: usize) -> usize {
-        if self.is_large(n_bytes) { self.total / SMALL_SHARE } else { 0 }
+    fn must_leave_free(&self, n_bytes: usize) -> usize {
+        if self.is_large(n_bytes) { self.total / KEPT_FREE_DIVISOR } else { 0 }
     }
 
     fn may_hold(&self, state: &State, owner: Owner, n_bytes: usize) -> bool {
@@ -210,7 +213,7 @@ impl Ledger {
 
     fn has_room(&self, state: &State, owner: Owner, n_bytes: usize) -> bool {
         let free = self.total.saturating_sub(state.held);
-        self.may_hold(state, owner, n_bytes) && n_bytes.saturating_add(self.closed_to(n_bytes)) <= free
+        self.may_hold(state, owner, n_bytes) && n_bytes.saturating_add(self.must_leave_free(n_bytes)) <= free
     }
 
     fn is_next(&self, state: &State, candidate: Waiting) -> bool {
