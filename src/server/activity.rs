@@ -1,5 +1,7 @@
 //! State of a connection for the code that decides whether it may go on: its own deadlines, and eviction in
 //! favour of a newcomer.
+//!
+//! All atomics are `Relaxed`: they publish no other memory, and a timer looks at them again.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, AtomicUsize, Ordering::Relaxed};
@@ -12,7 +14,8 @@ use tokio::sync::Notify;
 use super::pace::Pace;
 use crate::http::around::transport::HeadFault;
 
-/// Silence after which a client counts as having read a refusal that came before it had sent its body.
+/// Silence after which a lingering connection is closed. By then the client should have read the refusal that
+/// it got before it had sent its whole body.
 const LINGERING: Duration = Duration::from_secs(2);
 
 /// Time for which work goes on, without a byte of answer, for a client that has closed its sending side. A
@@ -29,10 +32,10 @@ pub struct Activity {
     /// Milliseconds after `began` at which a request last ended, or the client last took bytes that waited
     /// for it.
     idle_since: AtomicU64,
-    /// Milliseconds after `began`, plus one, at which the last answer was sent and only the close by the
-    /// client was still awaited. 0 before.
+    /// Time when the last answer had been sent, so that only the close by the client was awaited.
+    /// Milliseconds after `began`, plus one; 0 before.
     lingering_since: AtomicU64,
-    /// Milliseconds after `began`, plus one, at which the client last sent something after that. 0 before.
+    /// Time when the client last sent bytes while lingering. Same unit; 0 before.
     lingering_heard: AtomicU64,
     /// Milliseconds after `began`, plus one, at which the client closed its sending side while awaiting an
     /// answer. Moves to the last byte that it took since. 0 before.
@@ -41,9 +44,9 @@ pub struct Activity {
     ended: AtomicWaker,
     /// Debt of the client as a reader of its socket.
     pub pace: Pace,
-    /// Number of HTTP/2 streams with data for the client to take, and its debt while all requests have such
-    /// data.
+    /// Number of HTTP/2 streams with data for the client to take.
     n_unread: AtomicUsize,
+    /// Debt of the client while every request under way has such data.
     streams: Pace,
     /// Signals a decision by other code about this connection: see [`Activity::notice`].
     noticed: Notify,
@@ -107,25 +110,26 @@ impl Activity {
     /// answer.
     pub fn enter(self: &Arc<Self>) -> InFlight {
         self.n_in_flight.fetch_add(1, Relaxed);
-        // The client may wait for this answer before it reads the others.
+        // Pauses the clock and keeps the debt: the client may wait for this answer before it reads the others.
         self.streams.took(0);
+        // The next head has arrived, so the refused request before it was read to its end.
         self.is_answered_early.store(false, Relaxed);
         InFlight(self.clone())
     }
 
-    /// Records that the client took bytes that waited for it, so the connection is not idle.
-    pub fn stir(&self) {
+    /// Restarts the idle time: the client took bytes that waited for it, or a request ended.
+    pub fn reset_idle(&self) {
         self.idle_since.store(self.now(), Relaxed);
     }
 
     /// Records that a stream has data for the client to take.
-    pub fn give(&self) {
+    pub fn stream_has_data(&self) {
         self.n_unread.fetch_add(1, Relaxed);
         self.wait_if_all_are_unread();
     }
 
-    /// Records that the client took the data of a stream, or never will.
-    pub fn took(&self, n_bytes: usize) {
+    /// Records that the client took the data of a stream, `n_bytes`, or never will (0).
+    pub fn stream_was_read(&self, n_bytes: usize) {
         self.n_unread.fetch_sub(1, Relaxed);
         self.streams.took(n_bytes);
         self.wait_if_all_are_unread();
@@ -138,23 +142,25 @@ impl Activity {
         }
     }
 
-    /// Time for which only the client was waited for, beyond the time that its bytes take. `None` if the
-    /// connection is being evicted. New requests do not reduce it: a client that reads none of its answers
-    /// gains nothing by asking again.
+    /// Debt of the client: the time spent waiting for it alone, less the time its bytes take at
+    /// [`super::pace::LEAST_RATE`]. `None` while the connection is being evicted. A new request does not
+    /// reduce it.
     pub fn owed(&self) -> Option<Duration> {
         (!self.is_evicted.load(Relaxed)).then(|| self.pace.owed().max(self.streams.owed()))
     }
 
-    pub fn break_answer(&self) {
+    /// Records that an answer was given up before its end.
+    pub fn note_broken_answer(&self) {
         self.is_broken.store(true, Relaxed);
     }
 
     /// Returns whether an orderly end of the connection would make half an answer look complete.
-    pub fn has_half_an_answer(&self) -> bool {
+    pub fn has_unfinished_answer(&self) -> bool {
         self.is_broken.load(Relaxed) || self.n_in_flight.load(Relaxed) > 0 || self.pace.is_waiting()
     }
 
-    pub fn answer_early(&self) {
+    /// Records that an answer was given before its request had been read to its end.
+    pub fn note_early_answer(&self) {
         self.is_answered_early.store(true, Relaxed);
     }
 
@@ -176,27 +182,27 @@ impl Activity {
     /// Records that from now on only the close by the client is awaited.
     pub fn linger(&self) {
         if self.lingering_since.compare_exchange(0, self.now() + 1, Relaxed, Relaxed).is_ok() {
-            self.hear_out();
+            self.note_heard();
         }
     }
 
-    /// Records that the client still sends a request that was refused.
-    pub fn hear_out(&self) {
+    /// Restarts the silence after which lingering ends.
+    pub fn note_heard(&self) {
         self.lingering_heard.store(self.now() + 1, Relaxed);
     }
 
-    /// Records that the client has closed its sending side. Returns the time for which it may still wait for
-    /// an answer, unless it takes some of it.
+    /// Records that the client has closed its sending side. Returns how long the work goes on before the
+    /// client counts as gone.
     ///
-    /// Returns `None` if no request is under way, or if it has waited so long in vain that it may have left.
-    /// A client whose socket buffer is full is still there: otherwise the socket would report an error.
-    /// `waker` is woken when a request is over.
+    /// Bytes that it takes restart the clock. `None`: no request is under way, or the time is up. `waker` is
+    /// woken when a request ends.
     pub fn half_close(&self, waker: &Waker) -> Option<Duration> {
         self.ended.register(waker);
         if self.n_in_flight.load(Relaxed) == 0 {
             return None;
         }
         let _ = self.half_closed_since.compare_exchange(0, self.now() + 1, Relaxed, Relaxed);
+        // A client whose socket buffer is full is still there: otherwise the socket would report an error.
         if self.pace.is_waiting() {
             return Some(HALF_CLOSED);
         }
@@ -204,8 +210,8 @@ impl Activity {
         HALF_CLOSED.checked_sub(waited).filter(|left| !left.is_zero())
     }
 
-    /// Records that the client took bytes of an answer.
-    pub fn take(&self) {
+    /// Restarts the half-close timer: the client took bytes of an answer, so it is still there.
+    pub fn extend_half_close(&self) {
         if self.half_closed_since.load(Relaxed) > 0 {
             self.half_closed_since.store(self.now() + 1, Relaxed);
         }
@@ -250,10 +256,11 @@ impl Activity {
         if self.is_evicted.load(Relaxed) { Notice::Evicted } else { Notice::Draining }
     }
 
-    /// Resolves when the connection has had no request for `idle`, or its client owes more than `sending` as
-    /// a reader.
+    /// Resolves when the connection has had no request for `idle`, or its client owes more than `sending` for
+    /// the socket.
     ///
-    /// The state is polled by one timer per connection. So events on the connection need no timers.
+    /// A single HTTP/2 stream that is overdue is reset in connection.rs. Lingering ends here too, as
+    /// [`Expiry::Idle`]. One timer polls the counters, so an event on the connection only stores a number.
     pub async fn expired(&self, idle: Duration, sending: Duration) -> Expiry {
         let tick = (idle.min(sending) / 8).clamp(Duration::from_millis(10), Duration::from_millis(500));
         loop {
@@ -284,7 +291,7 @@ impl InFlight {
 
 impl Drop for InFlight {
     fn drop(&mut self) {
-        self.0.stir();
+        self.0.reset_idle();
         self.0.n_in_flight.fetch_sub(1, Relaxed);
         self.0.wait_if_all_are_unread();
         self.0.ended.wake();

@@ -92,7 +92,7 @@ impl<B: Body<Data = Bytes> + Unpin> Sending<B> {
         self.is_ended = self.n_announced == Some(0) || self.is_end_stream();
         if let Some(pace) = &self.pace {
             pace.wait();
-            self.in_flight.activity().give();
+            self.in_flight.activity().stream_has_data();
         }
         Frame::data(piece)
     }
@@ -112,7 +112,7 @@ impl<B: Body<Data = Bytes> + Unpin> Body for Sending<B> {
             let n_given = std::mem::take(&mut this.n_given);
             pace.took(n_given);
             if n_given > 0 {
-                this.in_flight.activity().took(n_given);
+                this.in_flight.activity().stream_was_read(n_given);
             }
         }
         if this.rest.is_empty() {
@@ -153,11 +153,11 @@ impl<B: Body<Data = Bytes> + Unpin> Body for Sending<B> {
 impl<B> Drop for Sending<B> {
     fn drop(&mut self) {
         if self.pace.is_some() && self.n_given > 0 {
-            self.in_flight.activity().took(0);
+            self.in_flight.activity().stream_was_read(0);
         }
         // A stream of HTTP/2 has a reset of its own.
         if !self.is_ended && self.pace.is_none() {
-            self.in_flight.activity().break_answer();
+            self.in_flight.activity().note_broken_answer();
         }
     }
 }

@@ -180,7 +180,7 @@ async fn exchange(
     let pace = STREAM.try_with(Arc::clone).ok();
     if pace.is_none() && !arrival.is_read() {
         let activity = in_flight.activity();
-        activity.answer_early();
+        activity.note_early_answer();
         // hyper closes the connection unless it can read the body to its end in one step. The client must
         // then not send another request. Chunks take a step each. A body of known length takes one step if
         // all of it was received.

@@ -76,12 +76,12 @@ impl Socket {
             Poll::Pending => self.activity.pace.wait(),
             Poll::Ready(written) => {
                 if self.activity.pace.is_waiting() {
-                    self.activity.stir();
+                    self.activity.reset_idle();
                 }
                 let n_taken = *written.as_ref().unwrap_or(&0);
                 self.activity.pace.took(n_taken);
                 if n_taken > 0 {
-                    self.activity.take();
+                    self.activity.extend_half_close();
                 }
             }
         }
@@ -167,7 +167,7 @@ impl AsyncWrite for Socket {
             if outcome.is_err() || buffer.filled().is_empty() {
                 return Poll::Ready(Ok(()));
             }
-            self.activity.hear_out();
+            self.activity.note_heard();
         }
         cx.waker().wake_by_ref();
         Poll::Pending
@@ -177,7 +177,7 @@ impl AsyncWrite for Socket {
 impl Drop for Socket {
     /// Resets the connection if an answer was cut: in HTTP/1.0 an orderly end would mark the answer complete.
     fn drop(&mut self) {
-        if self.activity.has_half_an_answer() {
+        if self.activity.has_unfinished_answer() {
             // It fails if the client has gone, which does no harm.
             let _ = self.inner.tcp().set_zero_linger();
         }
