@@ -8,7 +8,7 @@
 //! removing the old key later. The clouds stay where they are.
 //!
 //! ROTATION. The file is read again when it changes. A file that cannot be read or parsed changes nothing and
-//! is reported. A file without keys lets nobody in.
+//! is reported. Keys of the configuration stay valid. With none there, an empty file lets nobody in.
 
 mod file;
 mod limits;
@@ -38,7 +38,7 @@ pub fn check_file(text: &str) -> Result<usize, String> {
 }
 
 /// Interval between two checks of the file for changes.
-const LOOKING: Duration = Duration::from_secs(1);
+const CHECK_INTERVAL: Duration = Duration::from_secs(1);
 
 /// BLAKE3 hash of a key, or of the text of the file of keys.
 type Digest = [u8; 32];
@@ -48,7 +48,7 @@ pub struct Keys {
     configured: Vec<Digest>,
     file: Option<PathBuf>,
     /// Digest of the text of the file that was read at startup.
-    first: Digest,
+    digest_at_start: Digest,
     callers: ArcSwap<Vec<Arc<Caller>>>,
     /// Views, indexed by owner. Indices are never reused.
     views: Mutex<Vec<OwnerName>>,
@@ -71,6 +71,10 @@ impl Caller {
     pub fn enter(&self) -> Result<Entered, TooMany> {
         self.limits.enter()
     }
+
+    fn has_same_settings(&self, other: &Self) -> bool {
+        self.name == other.name && self.owner == other.owner && self.limits.rule == other.limits.rule
+    }
 }
 
 impl Keys {
@@ -80,24 +84,23 @@ impl Keys {
     /// Tells what is wrong with the file.
     pub fn new(config: &Config) -> Result<Self, String> {
         let digest = |key: &String| blake3::hash(key.trim().as_bytes()).into();
-        // The configuration refuses blank keys. Should one get here, it belongs to nobody.
-        let configured = config.api_keys.iter().filter(|key| !key.trim().is_empty()).map(digest).collect();
-        let (file, first) = match &config.keys_file {
-            Some(path) if !config.is_open() => read_file(path)?,
-            _ => Default::default(),
+        let configured = config.api_keys.iter().map(digest).collect();
+        let (file, digest_at_start) = match &config.keys_file {
+            Some(path) => read_file(path)?,
+            None => Default::default(),
         };
         let keys = Self {
             configured,
             file: config.keys_file.clone(),
-            first,
+            digest_at_start,
             callers: ArcSwap::default(),
             views: Mutex::default(),
         };
         if config.is_open() {
-            keys.owner(OwnerName("everyone".to_owned()));
+            keys.register_view(OwnerName("everyone".to_owned()));
             return Ok(keys);
         }
-        keys.put(&file);
+        keys.replace_keys(&file);
         Ok(keys)
     }
 
@@ -118,6 +121,7 @@ impl Keys {
 
     /// The name of an owner's view. It does not depend on the order of the keys and does not reveal a key.
     pub fn name_of(&self, owner: Owner) -> OwnerName {
+        // "nobody" is only for an owner that this process never registered.
         self.views().get(owner.0).cloned().unwrap_or_else(|| OwnerName("nobody".to_owned()))
     }
 
@@ -140,11 +144,13 @@ impl Keys {
     /// is unchanged and still readable.
     pub async fn follow_file(self: Arc<Self>) {
         let Some(path) = &self.file else { return };
-        let mut last = Ok(self.first);
-        let mut ticks = tokio::time::interval(LOOKING);
+        let mut last = Ok(self.digest_at_start);
+        let mut ticks = tokio::time::interval(CHECK_INTERVAL);
         loop {
             ticks.tick().await;
+            // Blocks for one small file a second.
             let found = read_file(path);
+            // Errors are compared too, so that a lasting one is logged once.
             let now = found.as_ref().map(|(_, digest)| *digest).map_err(String::clone);
             if now == last {
                 continue;
@@ -152,30 +158,31 @@ impl Keys {
             last = now;
             match found {
                 Ok((file, _)) => {
-                    self.put(&file);
+                    self.replace_keys(&file);
                     tracing::info!(n_keys = self.callers.load().len(), "keys were read again");
                 }
-                Err(error) => {
-                    tracing::error!(error, "the keys are unchanged: their file (GRAMIAN_KEYS_FILE)")
-                }
+                Err(error) => tracing::error!(
+                    error,
+                    "the keys file (GRAMIAN_KEYS_FILE) was not reloaded; the previous keys stay valid"
+                ),
             }
         }
     }
 
     /// Replaces the keys of the file. A key whose name, view and limits are unchanged keeps its counters.
-    fn put(&self, file: &KeysFile) {
+    fn replace_keys(&self, file: &KeysFile) {
         let before = self.callers.load_full();
         let before: HashMap<Digest, &Arc<Caller>> =
             before.iter().map(|caller| (caller.digest, caller)).collect();
         let configured = self.configured.iter().map(|&digest| Caller {
             digest,
             name: None,
-            owner: self.owner(view_of_digest(&digest)),
+            owner: self.register_view(view_of_digest(&digest)),
             limits: Limits::default(),
         });
         let named = file.keys.iter().map(|entry| self.caller(entry));
         let kept = |caller: Caller| match before.get(&caller.digest) {
-            Some(same) if same.is_as(&caller) => (*same).clone(),
+            Some(same) if same.has_same_settings(&caller) => (*same).clone(),
             _ => Arc::new(caller),
         };
         self.callers.store(Arc::new(configured.chain(named).map(kept).collect()));
@@ -185,12 +192,13 @@ impl Keys {
         Caller {
             digest: entry.digest,
             name: Some(entry.name.clone()),
-            owner: self.owner(OwnerName(format!("view-{}", entry.view()))),
+            owner: self.register_view(OwnerName(format!("view-{}", entry.view()))),
             limits: Limits::new(entry.rule),
         }
     }
 
-    fn owner(&self, name: OwnerName) -> Owner {
+    /// Returns the owner of a view, new if the name is. Indices are never reused.
+    fn register_view(&self, name: OwnerName) -> Owner {
         let mut views = self.views();
         let found = views.iter().position(|view| *view == name);
         Owner(found.unwrap_or_else(|| {
@@ -202,12 +210,6 @@ impl Keys {
     #[expect(clippy::disallowed_methods, reason = "a list of names, for as long as it takes to look into it")]
     fn views(&self) -> MutexGuard<'_, Vec<OwnerName>> {
         self.views.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Caller {
-    fn is_as(&self, other: &Self) -> bool {
-        self.name == other.name && self.owner == other.owner && self.limits.rule == other.limits.rule
     }
 }
 

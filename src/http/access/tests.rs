@@ -42,13 +42,13 @@ fn keys_are_replaced_and_their_views_stay() {
     assert!(before.enter().is_ok() && before.enter().is_err());
     let both =
         format!("{lines_of_two}{lines_of_next}view = \"one\"\n{lines_of_one}requests_per_minute = 1\n");
-    keys.put(&KeysFile::parse(&both).unwrap());
+    keys.replace_keys(&KeysFile::parse(&both).unwrap());
     assert_eq!(owner_of(&keys, &next), Some(before.owner));
     // Reloading the file does not reset the counters.
     assert!(keys.caller_of(&one).unwrap().enter().is_err() && keys.caller_of(&next).unwrap().enter().is_ok());
-    keys.put(&KeysFile::parse(&lines_of_two).unwrap());
+    keys.replace_keys(&KeysFile::parse(&lines_of_two).unwrap());
     assert!(owner_of(&keys, &one).is_none() && owner_of(&keys, &two) == Some(Owner(1)));
-    keys.put(&KeysFile::default());
+    keys.replace_keys(&KeysFile::default());
     assert!(owner_of(&keys, &two).is_none() && !keys.is_open());
 }
 
@@ -56,7 +56,7 @@ fn keys_are_replaced_and_their_views_stay() {
 fn as_many_requests_as_a_key_may_have_at_once() {
     let (key, lines) = generate("one").unwrap();
     let keys = keys(&["--api-keys", "other"]).unwrap();
-    keys.put(&KeysFile::parse(&format!("{lines}concurrent_requests = 2\n")).unwrap());
+    keys.replace_keys(&KeysFile::parse(&format!("{lines}concurrent_requests = 2\n")).unwrap());
     let caller = keys.caller_of(&key).unwrap();
     let (first, second) = (caller.enter(), caller.enter());
     assert_eq!(caller.enter().err().map(|too_many| too_many.limit), Some("2 requests at once".to_owned()));
