@@ -98,7 +98,7 @@ pub async fn name_and_log(State(app): State<Arc<App>>, mut request: Request, nex
     response
 }
 
-/// The cloud that the request names in its header or path, for proxies. Every answer repeats it.
+/// The cloud that the request names in its header or path, for proxies. Its answer repeats the id.
 fn named_cloud(request: &Request) -> Option<HeaderValue> {
     let is_id = |text: &&str| CloudId::parse(text).is_some();
     let in_head = request.headers().get(CLOUD_HEADER).and_then(|value| value.to_str().ok()).filter(is_id);

@@ -31,8 +31,9 @@ pub fn add(document: &mut utoipa::openapi::OpenApi) {
                      nx, ny, nz their normals if all three are there, of any type of number; other properties and elements are ignored."
                 }
                 Format::Json | Format::Safetensors => {
-                    "F64 or F32 tensors named as the JSON arrays, those within objects as `cloud.points`; the other fields \
-                     as JSON text in the metadata entry `request`. At most 64 tensors and a header of 64 KiB."
+                    "Safetensors. Each JSON array of numbers becomes an F64 or F32 tensor of the same name, with dots for \
+                     nesting (`cloud.points`). All other fields are JSON text in the metadata entry `request`. At most 64 \
+                     tensors; header at most 64 KiB."
                 }
             });
             body.content.insert(format.media_type().to_owned(), content);

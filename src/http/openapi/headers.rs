@@ -13,7 +13,7 @@ const HEADERS: [(&str, &str, &str); 8] = [
     (
         "X-Request-Id",
         "0193a5e7-8c1d-7b22-9f0e-5d3c6f1a2b4c",
-        "The id of the request, as in the logs and in `instance` of problems; the client's own if it sent a valid one.",
+        "The id of the request, as in the logs and in `instance` of problems; the client's own id if it sent one in the allowed form.",
     ),
     (
         "Server-Timing",
@@ -23,13 +23,15 @@ const HEADERS: [(&str, &str, &str); 8] = [
     (
         "Cache-Status",
         "gramian; hit",
-        "Whether the factorization was cached: `gramian; hit`, `gramian; fwd=miss; stored`, `gramian; fwd=miss; collapsed` \
-         (another request computed it), `gramian; fwd=miss`. An answer from two factorizations is a hit only if both were cached.",
+        "`gramian; hit`: the factorization was cached. `gramian; fwd=miss; stored`: computed and kept. \
+         `gramian; fwd=miss; collapsed`: another request was computing it. `gramian; fwd=miss`: computed, not kept. \
+         With two factorizations, a hit only if both were cached.",
     ),
     (
         "Gramian-Cloud",
         "bd711900da5366ee5d24b56f902cd7e737e487987d5285c2791b2955e124c69c",
-        "The cloud that the answer is about. Send it with requests that name a cloud: a proxy in front of several servers routes by it to the server that holds the factorizations. Every answer repeats it, including refusals.",
+        "The cloud that the answer is about. Send it with requests that name a cloud: a proxy can then route them to the \
+         server that holds its factorizations. An id sent in this header or in the path is repeated, in refusals too.",
     ),
     ("Location", "/v1/clouds/…", "The path of the cloud."),
     ("ETag", "W/\"…\"", "The id of the cloud in quotes, weak; for If-None-Match."),
@@ -40,10 +42,10 @@ const HEADERS: [(&str, &str, &str); 8] = [
 /// Declares the headers and refers to them from the answers of every operation.
 pub fn add(document: &mut utoipa::openapi::OpenApi) {
     for operation in operations(document) {
-        let own = own_names(operation);
+        let on_success = names_on_success(operation);
         for (status, response) in &mut operation.responses.responses {
             let RefOr::T(response) = response else { continue };
-            for name in names(status, &own) {
+            for name in names_for_status(status, &on_success) {
                 let reference = Ref::new(format!("#/components/headers/{name}"));
                 response.headers.insert(name.to_owned(), RefOr::Ref(reference));
             }
@@ -54,7 +56,7 @@ pub fn add(document: &mut utoipa::openapi::OpenApi) {
 }
 
 /// Returns the headers that an operation has when it succeeds.
-fn own_names(operation: &Operation) -> Vec<&'static str> {
+fn names_on_success(operation: &Operation) -> Vec<&'static str> {
     match id_of(operation) {
         "create_cloud" => vec!["Location", "Gramian-Cloud"],
         "get_cloud" | "check_cloud" => vec!["ETag", "Gramian-Cloud"],
@@ -64,10 +66,11 @@ fn own_names(operation: &Operation) -> Vec<&'static str> {
     }
 }
 
-/// Returns the headers of answers with this status.
-fn names(status: &str, own: &[&'static str]) -> Vec<&'static str> {
+/// Returns the headers that answers with this status have: X-Request-Id always, `on_success` on 200, 201 and
+/// 304.
+fn names_for_status(status: &str, on_success: &[&'static str]) -> Vec<&'static str> {
     let by_status = match status {
-        "200" | "201" | "304" => own,
+        "200" | "201" | "304" => on_success,
         "401" => &["WWW-Authenticate"],
         "429" | "503" => &["Retry-After"],
         _ => &[],
@@ -75,6 +78,7 @@ fn names(status: &str, own: &[&'static str]) -> Vec<&'static str> {
     [&["X-Request-Id"], by_status].concat()
 }
 
+/// Returns the component of a header. An example that is a number makes the header an integer.
 fn header(example: &str, description: &str) -> RefOr<Header> {
     let (kind, example) = match example.parse::<u64>() {
         Ok(number) => (Type::Integer, number.into()),

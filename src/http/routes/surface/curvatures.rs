@@ -77,9 +77,10 @@ operation! {
 ///
 /// Returns principal curvatures with their directions, mean curvatures and Gaussian curvatures. Principal
 /// curvatures are eigenvalues of the shape operator S = σPD²uP/|∇u| of the level surface of the signature
-/// function u. Where the gradient of u vanishes or is weak, an offset model of the nearest points takes the
-/// place of u. A sphere of radius r has curvatures +1/r with outward normals. Entries that the points around
-/// a query do not confirm are flagged.
+/// function u, where P projects onto the tangent space and σ = ±1 is such that σ∇u points along the normal. A
+/// sphere of radius r has curvatures +1/r with outward normals. Where ∇u vanishes or is too small to be
+/// trusted, the nearest points and copies shifted by ±δ along their normals are interpolated instead (the
+/// offset model). An entry that disagrees with the points around its query is listed in `degenerate`.
 pub async fn compute_curvatures(CurvaturesRequest) -> CurvaturesResponse;
 path: "/v1/curvatures", tag: "geometry", answer: "Curvatures at the queries"
 }

@@ -67,8 +67,8 @@ operation! {
 ///
 /// Returns the unit normals ν = −∇u/|∇u| (outward) of the level surface of the signature function u, the
 /// interpolant of the constant 1. The cloud needs no mesh and no neighbourhoods. Signs are checked against
-/// the neighbours and repaired. Where the gradient of u vanishes, an offset model of the nearest points takes
-/// the place of u.
+/// the neighbours and repaired. Where ∇u vanishes, the nearest points and copies shifted by ±δ along their
+/// normals are interpolated instead (the offset model).
 pub async fn compute_normals(NormalsRequest) -> NormalsResponse;
 path: "/v1/normals", tag: "geometry", answer: "Normals at the queries"
 }
