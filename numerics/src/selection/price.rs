@@ -2,7 +2,7 @@
 
 use super::alpha_path::{ALPHAS_AT_ONCE, is_decomposed};
 use super::criterion::Criterion;
-use super::search::SIDE_BY_SIDE;
+use super::search::MAX_SIDE_BY_SIDE_POINTS;
 use crate::machine::price::Price;
 
 /// Returns the number of evaluations that a descent over `n_free` numbers usually takes. About 50 were
@@ -47,7 +47,7 @@ pub fn selection_price(cloud: CloudSize, criterion: Criterion, search: SearchSiz
         Criterion::LeaveOneOut | Criterion::GeneralizedCrossValidation => 2.0,
     };
     let evaluation = n * n * (cubes * n + 40.0 + 2.0 * d + 4.0 * n_free as f64);
-    let side_by_side = if n_points <= SIDE_BY_SIDE { n_descents.min(n_threads).max(1) } else { 1 };
+    let side_by_side = if n_points <= MAX_SIDE_BY_SIDE_POINTS { n_descents.min(n_threads).max(1) } else { 1 };
     let beside = n_points.saturating_mul(4 * dimension + 20);
     let n_numbers = n_points.saturating_mul(n_points).saturating_mul(3).saturating_add(beside);
     Price {

@@ -63,17 +63,18 @@ impl Agreement<'_> {
     fn best(&mut self, cells: [Cell; N_FAMILIES]) -> Result<Cell> {
         let mut best = (cells[0], f64::INFINITY);
         for cell in cells {
-            let height = self.height(cell)?;
-            if height < best.1 {
-                best = (cell, height);
+            let negative_log = self.negative_log_posterior(cell)?;
+            if negative_log < best.1 {
+                best = (cell, negative_log);
             }
         }
         Ok(best.0)
     }
 
-    fn height(&mut self, cell: Cell) -> Result<f64> {
-        let of_deep = self.deep.as_mut().map_or(Ok(0.0), |deep| deep.height(cell))?;
-        Ok(self.all.height(cell)? + of_deep)
+    /// Returns the sum over all groups and the deep ones.
+    fn negative_log_posterior(&mut self, cell: Cell) -> Result<f64> {
+        let of_deep = self.deep.as_mut().map_or(Ok(0.0), |deep| deep.negative_log_posterior(cell))?;
+        Ok(self.all.negative_log_posterior(cell)? + of_deep)
     }
 
     /// Returns the verdict on a cell, or `None` if it does not explain the values in float64.

@@ -8,6 +8,9 @@ use crate::kernel::{Family, Kernel};
 /// Families from rough to smooth. All have second derivatives, which operators need.
 const FAMILIES: [Family; 3] = [Family::Matern { order: 2 }, Family::Matern { order: 4 }, Family::Gauss];
 
+/// Index of the roughest of [`FAMILIES`], with which a search starts.
+pub(super) const ROUGHEST: usize = 0;
+
 /// Steps by which the length scale of a family is shorter than that of the family before, for the same
 /// correlations.
 const SHORTER: usize = 2;
@@ -116,7 +119,7 @@ impl Grid {
     /// Returns the kernel and noise for values that do not decide.
     pub(super) fn undecided(&self, values: &Values<'_>) -> Learned {
         let observed = &values.observed;
-        let family = FAMILIES[0];
+        let family = FAMILIES[ROUGHEST];
         let ratio = ratio(self.least_ratio);
         // Without a spread, only the size of the values indicates how much they may vary.
         let mean_square = observed.values.iter().map(|v| v * v).sum::<f64>() / observed.values.len() as f64;
@@ -177,11 +180,11 @@ impl Grid {
         }
     }
 
-    /// Cells at which a search begins. Their ratios are far apart.
-    pub(super) fn beginnings(&self) -> impl Iterator<Item = Cell> + use<> {
+    /// Cells at which a search starts. Their ratios are far apart.
+    pub(super) fn starts(&self) -> impl Iterator<Item = Cell> + use<> {
         let n = if self.is_exact() { 1 } else { N_RATIOS };
         let ratios = (self.least_ratio..N_RATIOS).step_by(COARSE_RATIOS).take(n);
-        ratios.map(|ratio| Cell { family: 0, length: FIRST_LENGTH, ratio })
+        ratios.map(|ratio| Cell { family: ROUGHEST, length: FIRST_LENGTH, ratio })
     }
 
     /// Returns the cell of a rough field with the least noise.

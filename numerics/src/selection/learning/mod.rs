@@ -161,7 +161,7 @@ fn search(all: &Evidence<'_>, order: &Order, observer: &dyn Observer) -> Result<
             let sample = Evidence::of(values, std::slice::from_ref(first));
             let mut on_sample = Search::new(&sample, &grid, observer);
             let Some(best) = on_sample.best()? else { return Ok(None) };
-            let Some(begin) = on_sample.least_of(best.into_iter())? else { return Ok(None) };
+            let Some(begin) = on_sample.likeliest(best.into_iter())? else { return Ok(None) };
             Some(agreement.all.best_from(begin)?)
         }
         _ => agreement.all.best()?,

@@ -1,20 +1,21 @@
 //! Search for the likeliest cell of the grid.
 
-use super::grid::{Cell, Grid, N_CELLS, N_FAMILIES, Step, along_ridge};
+use super::grid::{Cell, Grid, N_CELLS, N_FAMILIES, ROUGHEST, Step, along_ridge};
 use super::likelihood::{Evidence, Score};
 use crate::error::Result;
 use crate::observer::Observer;
 
-/// Steps of a search from nothing, in ratios. Steps in length scales are half as long.
+/// Strides along the ratio axis of the grid, for a search without a first guess. Strides along the length
+/// axis are half, rounded up.
 const STRIDES: [isize; 3] = [4, 2, 1];
 
-/// Steps of a search that begins at the result on some of the values.
+/// Strides of a search that begins at the result on some of the values.
 const FINE: [isize; 1] = [1];
 
-/// Least gain of a step.
+/// Least decrease of the negative log posterior that counts as a gain, in nats.
 const GAIN: f64 = 1e-6;
 
-/// Largest loss in log likelihood at which a kernel is as good a guess as the best one.
+/// Largest loss in log posterior, in nats, at which a kernel is as good a guess as the best one.
 const AS_LIKELY: f64 = 1.0;
 
 /// Scores of cells, computed on demand.
@@ -22,6 +23,7 @@ pub(super) struct Search<'a> {
     evidence: &'a Evidence<'a>,
     grid: &'a Grid,
     observer: &'a dyn Observer,
+    /// `None` until computed. `Some(None)` if the cell does not explain the values.
     scores: Vec<Option<Option<Score>>>,
 }
 
@@ -35,13 +37,16 @@ impl<'a> Search<'a> {
     /// # Errors
     /// `NumericsError::Cancelled`.
     pub(super) fn best(&mut self) -> Result<Option<[Cell; N_FAMILIES]>> {
-        let Some(mut from) = self.least_of(self.grid.beginnings())? else { return Ok(None) };
+        let Some(mut from) = self.likeliest(self.grid.starts())? else { return Ok(None) };
         let mut best = [from; N_FAMILIES];
         for (family, best) in best.iter_mut().enumerate() {
+            // Each family starts from the best cell of the previous one.
             from = self.descend(self.grid.of_family(from, family), &STRIDES)?;
-            if family == 0 && self.is_mostly_noise(from)? {
+            // A long length scale may explain rough values as noise. A rough field with the least noise is
+            // tried too. Smoother families start from the better of both.
+            if family == ROUGHEST && self.is_mostly_noise(from)? {
                 let rough = self.descend(self.grid.rough(family), &STRIDES)?;
-                from = self.least_of([from, rough].into_iter())?.unwrap_or(from);
+                from = self.likeliest([from, rough].into_iter())?.unwrap_or(from);
             }
             *best = from;
         }
@@ -64,16 +69,16 @@ impl<'a> Search<'a> {
 
     /// Finds the shortest length scale of all kernels of a family that are [`AS_LIKELY`] as the best one.
     ///
-    /// Bands from the best kernel alone are those of a kernel that happens to fit. Where values leave the
-    /// length scale open, the best one is mostly too long. The noise is the likeliest for the length scale.
+    /// A band from the best kernel alone is too narrow, since where values leave ℓ open the best ℓ is mostly
+    /// too long. For each ℓ, the noise is the likeliest one.
     ///
     /// # Errors
     /// `NumericsError::Cancelled`.
     pub(super) fn shortest(&mut self, best: Cell) -> Result<Cell> {
-        let most = self.height(best)? + AS_LIKELY;
+        let limit = self.negative_log_posterior(best)? + AS_LIKELY;
         let mut found = best;
         while let Some(next) = self.shorter(found)? {
-            if self.height(next)? > most {
+            if self.negative_log_posterior(next)? > limit {
                 break;
             }
             found = next;
@@ -88,7 +93,7 @@ impl<'a> Search<'a> {
     pub(super) fn shorter(&mut self, cell: Cell) -> Result<Option<Cell>> {
         let straight = self.grid.moved(cell, Step { lengths: -1, ratios: 0 });
         let along = self.grid.moved(cell, along_ridge(cell.family, -1));
-        match self.least_of(straight.into_iter().chain(along))? {
+        match self.likeliest(straight.into_iter().chain(along))? {
             Some(from) => self.line(from, Step { lengths: 0, ratios: 1 }).map(Some),
             None => Ok(None),
         }
@@ -99,16 +104,16 @@ impl<'a> Search<'a> {
         Ok(self.against_noise(cell, score) > 0.0)
     }
 
-    /// Returns the cell of the least height, the first of equals.
+    /// Returns the cell with the greatest posterior, the first of equals.
     ///
     /// # Errors
     /// `NumericsError::Cancelled`.
-    pub(super) fn least_of(&mut self, cells: impl Iterator<Item = Cell>) -> Result<Option<Cell>> {
+    pub(super) fn likeliest(&mut self, cells: impl Iterator<Item = Cell>) -> Result<Option<Cell>> {
         let mut best = None;
         for cell in cells {
-            let height = self.height(cell)?;
-            if best.is_none_or(|(_, least)| height < least) {
-                best = Some((cell, height));
+            let negative_log = self.negative_log_posterior(cell)?;
+            if best.is_none_or(|(_, least)| negative_log < least) {
+                best = Some((cell, negative_log));
             }
         }
         Ok(best.map(|(cell, _)| cell))
@@ -138,7 +143,7 @@ impl<'a> Search<'a> {
         for sign in [1, -1] {
             let (mut at, mut factor) = (begin, sign);
             while let Some(next) = self.grid.moved(at, direction.times(factor)) {
-                if self.height(next)? >= self.height(at)? - GAIN {
+                if self.negative_log_posterior(next)? >= self.negative_log_posterior(at)? - GAIN {
                     break;
                 }
                 at = next;
@@ -151,12 +156,12 @@ impl<'a> Search<'a> {
         Ok(begin)
     }
 
-    /// Returns `−ln` of how likely a cell is by the values and by the prior on noise. Infinite if the cell
-    /// does not explain the values in float64.
+    /// Returns `−ln(likelihood · prior on noise)`, up to a constant. Infinite if the cell does not explain the
+    /// values in float64.
     ///
     /// # Errors
     /// `NumericsError::Cancelled`.
-    pub(super) fn height(&mut self, cell: Cell) -> Result<f64> {
+    pub(super) fn negative_log_posterior(&mut self, cell: Cell) -> Result<f64> {
         let Some(score) = self.score(cell)? else { return Ok(f64::INFINITY) };
         Ok(score.negative_log + self.against_noise(cell, score))
     }

@@ -25,7 +25,7 @@ pub const MAX_EVALUATIONS: usize = 200;
 
 /// Largest number of points for which descents run side by side, one on each thread. So small a factorization
 /// does not keep two threads busy.
-pub(super) const SIDE_BY_SIDE: usize = 1024;
+pub(super) const MAX_SIDE_BY_SIDE_POINTS: usize = 1024;
 
 /// A search: the data, the criterion, and the range of hyperparameters.
 #[derive(Debug, Clone, Copy)]
@@ -36,7 +36,7 @@ pub struct Selection<'a> {
     pub start: &'a Hyperparameters,
     /// Free parameters. If there are none, only the start is evaluated.
     pub vary: &'a [Variation],
-    /// Families to try. If there are none, that of the start is. Laplace has the ε given here unless ε
+    /// Families to try; empty for the family of the start alone. Laplace takes its ε from here unless ε
     /// varies.
     pub families: &'a [Family],
     /// Further starts, spread over the logarithms of the bounds.
@@ -54,14 +54,14 @@ pub struct Selected {
     /// Score of the criterion. Greater is better.
     pub score: f64,
     /// Derivatives of the score by the logarithms of the free numbers. [`Parameter::LengthScales`] has one
-    /// for each axis.
+    /// for each axis. Same order as `free`.
     pub gradient: Vec<f64>,
     /// Parameter of each free number, and the bound that it is at, if any.
     pub free: Vec<(Parameter, Option<Side>)>,
     /// Evaluations of the criterion by all descents together.
     pub evaluations: usize,
-    /// True if all slopes that can be followed are at most 0.01 per factor of e, on the scale of a log
-    /// likelihood.
+    /// True if no component of the gradient exceeds 0.01 per factor of e, in units of log likelihood.
+    /// Components that lead out of the bounds do not count.
     pub converged: bool,
     /// Mean from generalised least squares, in coordinates of the cloud.
     pub trend: Option<Trend>,
@@ -93,14 +93,14 @@ pub fn select(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Sele
     for &family in families {
         let base = Hyperparameters { family, ..start.clone() };
         let space = Space::of(&base, vary, cloud.dimension())?;
-        // Hyperparameters that are invalid at the start are refused with a reason, not searched.
+        // An invalid start is refused here, with its reason.
         space.at(&space.start()).kernel_on(cloud)?;
         spaces.push(space);
     }
     observer.enter(Stage::Factor);
     let jobs: Vec<(&Space, Vec<f64>)> = spaces.iter().flat_map(|space| starts(space, selection)).collect();
-    let ended = run_all(&subject, selection, &jobs, observer)?;
-    best_of(&subject, selection, &spaces, ended, observer)
+    let descents = run_all(&subject, selection, &jobs, observer)?;
+    best_of(&subject, selection, &spaces, descents, observer)
 }
 
 /// Refuses a varying ε unless one of the families has it.
@@ -115,8 +115,8 @@ fn check_epsilon(families: &[Family], vary: &[Variation]) -> Result<()> {
     }
 }
 
-/// Returns the start of a space and further starts: a low-discrepancy sequence (Roberts 2018) from an offset
-/// that depends on the seed.
+/// Returns the start of a space, then the restarts: points of the R-sequence (Roberts 2018), shifted by an
+/// offset from the seed.
 fn starts<'a>(space: &'a Space, selection: &Selection<'_>) -> Vec<(&'a Space, Vec<f64>)> {
     let bounds = space.bounds();
     let dimension = bounds.len();
@@ -152,12 +152,13 @@ fn run_all(
     jobs: &[(&Space, Vec<f64>)],
     observer: &dyn Observer,
 ) -> Result<Vec<(Option<Found>, usize)>> {
-    let is_alone = jobs.len() > 1 && subject.n_points() <= SIDE_BY_SIDE;
-    let evaluator = || Evaluator::new(subject, selection.criterion, is_alone);
+    let side_by_side = jobs.len() > 1 && subject.n_points() <= MAX_SIDE_BY_SIDE_POINTS;
+    // Side by side, each evaluator keeps to its own thread.
+    let evaluator = || Evaluator::new(subject, selection.criterion, side_by_side);
     let job = |evaluator: &mut Evaluator<'_>, (space, start): &(&Space, Vec<f64>)| {
         descend(evaluator, space, start, selection.max_evaluations, observer)
     };
-    if is_alone {
+    if side_by_side {
         jobs.par_iter().with_max_len(1).map_init(evaluator, job).collect()
     } else {
         let mut evaluator = evaluator();
@@ -165,19 +166,21 @@ fn run_all(
     }
 }
 
-/// Picks the best result of all descents and finishes it. `ended` lists the descents family by family.
+/// Picks the best descent and refines it with the evaluations that it has left. `descents` holds them family
+/// by family.
 fn best_of(
     subject: &Subject<'_>,
     selection: &Selection<'_>,
     spaces: &[Space],
-    ended: Vec<(Option<Found>, usize)>,
+    descents: Vec<(Option<Found>, usize)>,
     observer: &dyn Observer,
 ) -> Result<Selected> {
-    let mut evaluations: usize = ended.iter().map(|(_, evaluations)| evaluations).sum();
-    let per_family = ended.len() / spaces.len();
+    let mut evaluations: usize = descents.iter().map(|(_, evaluations)| evaluations).sum();
+    // Every space has the same free numbers (other families ignore ε), so each has equally many starts.
+    let per_family = descents.len() / spaces.len();
     let mut scores = vec![None; spaces.len()];
     let mut best: Option<(usize, Found, usize)> = None;
-    for (at, (found, used)) in ended.into_iter().enumerate() {
+    for (at, (found, used)) in descents.into_iter().enumerate() {
         let Some(found) = found else { continue };
         let family = at / per_family;
         scores[family] = Some(scores[family].map_or(found.score, |score: f64| score.max(found.score)));
@@ -192,8 +195,8 @@ fn best_of(
     let space = &spaces[family];
     let mut evaluator = Evaluator::new(subject, selection.criterion, false);
     let left = selection.max_evaluations.saturating_sub(used);
-    let (found, used) = finish(&mut evaluator, space, found, left, observer)?;
-    evaluations += used;
+    let (found, used_to_finish) = finish(&mut evaluator, space, found, left, observer)?;
+    evaluations += used_to_finish;
     scores[family] = Some(found.score);
     let sides = found.logarithms.iter().zip(space.bounds()).map(|(&x, (min, max))| side(x, min, max));
     Ok(Selected {
