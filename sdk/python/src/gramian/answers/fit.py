@@ -1,4 +1,4 @@
-"""Options of a fit as they were used, from an answer and its request: `**answer.fit` repeats the fit."""
+"""Options of a fit that the service used, from an answer and its request: `**answer.fit` repeats the fit."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ from ..wire.tensors import Array, Members
 
 
 def surface_fit_used(members: Members) -> SurfaceFit:
-    """Returns the fit of a surface as used."""
-    fit = _numbers_used(members)
-    if members.diagnostics.solver is SolverUsed.LOCAL:  # local regressions choose these by likelihood, and take none
+    """Returns the fit of a surface that the service used, ready to be sent again."""
+    fit = _reported_fit(members)
+    # Local regressions learn them by likelihood, and refuse them in requests.
+    if members.diagnostics.solver is SolverUsed.LOCAL:
         fit.pop("kernel", None)
         fit.pop("alpha", None)
         fit.pop("noise_variances", None)
@@ -35,13 +36,14 @@ def surface_fit_used(members: Members) -> SurfaceFit:
 
 
 def values_fit_used(members: Members) -> OperatorFit:
-    """Returns the fit of values as used, with the mean if there is one.
+    """Returns the fit of values that the service used, ready to be sent again, with the mean if there is one.
 
     Unlike for surfaces, the local solver for values takes a kernel, so the kernel is kept.
     """
-    fit = _numbers_used(members)
+    fit = _reported_fit(members)
     coefficients = members.diagnostics.mean_coefficients
-    if "mean_coefficients" in members:  # a row for each of many lists
+    # Batches: [n_lists, n_coefficients]. The last axis tells constant from linear.
+    if "mean_coefficients" in members:
         coefficients = members["mean_coefficients"]
     if not isinstance(coefficients, Unset):
         fit["mean"] = MeanChoice.CONSTANT if np.shape(coefficients)[-1] == 1 else MeanChoice.LINEAR
@@ -49,7 +51,7 @@ def values_fit_used(members: Members) -> OperatorFit:
 
 
 def selected_fit(members: Members) -> ValuesFit:
-    """Returns the fit with which a search ended, from the one with which it began."""
+    """Returns the selected fit: kernel and α found by the search, the other options as used."""
     fit = values_fit_used(members)
     fit["kernel"] = KernelUsed.from_dict(members["kernel"])
     if "alpha" in members:
@@ -58,20 +60,21 @@ def selected_fit(members: Members) -> ValuesFit:
 
 
 def operator_fit_used(members: Members) -> OperatorFit:
-    """Returns the fit of values as used, with the fit of the surface."""
+    """Returns the fit of values that the service used, ready to be sent again, with the fit of the surface."""
     fit, surface = values_fit_used(members), members.diagnostics.geometry
-    if isinstance(surface, Unset):  # by stencils, which fit nothing to the values
+    # Stencils fit nothing to the values, so the diagnostics are those of the surface.
+    if isinstance(surface, Unset):
         surface = members.diagnostics
         fit = OperatorFit(solver=SolverChoice.LOCAL, **_unreported(members.request))
     if surface.solver is SolverUsed.LOCAL:
-        # A local surface takes no kernel, not even that of the values. So the service chose the kernel of the
-        # values, and will choose it again.
+        # The service chose kernel and noise from the values. Leaving them out repeats that choice.
         fit.pop("kernel", None)
         fit.pop("alpha", None)
     return OperatorFit(**fit, geometry=_geometry_used(members.request, surface))
 
 
 def _geometry_used(request: Mapping[str, Any], surface: Diagnostics) -> Geometry:
+    """Returns the options of the surface as used. They replace those that the request left out."""
     asked = request.get("geometry", {})
     geometry = Geometry(
         cloud=None if surface.cloud_id == request["cloud"]["id"] else surface.cloud_id,
@@ -80,13 +83,19 @@ def _geometry_used(request: Mapping[str, Any], surface: Diagnostics) -> Geometry
     )
     if surface.solver is SolverUsed.LOCAL:
         return geometry
+    # No α in the diagnostics: each point had its own noise.
     if isinstance(surface.alpha, Unset):
+        # A geometry without noise variances takes those of the values.
         noise_variances = asked.get("noise_variances", request.get("noise_variances"))
         return replace(geometry, kernel=surface.kernel, noise_variances=_own_copy(noise_variances))
     return replace(geometry, kernel=surface.kernel, alpha=surface.alpha)
 
 
-def _numbers_used(members: Members) -> OperatorFit:
+def _reported_fit(members: Members) -> OperatorFit:
+    """Returns kernel, solver and noise from the diagnostics.
+
+    Options that diagnostics do not report come from the request.
+    """
     diagnostics, request = members.diagnostics, members.request
     fit = OperatorFit(kernel=diagnostics.kernel, solver=diagnostics.solver, **_unreported(request))
     if isinstance(diagnostics.alpha, Unset):
@@ -97,7 +106,7 @@ def _numbers_used(members: Members) -> OperatorFit:
 
 
 def _unreported(request: Mapping[str, Any]) -> OperatorFit:
-    """Returns the given options of which diagnostics say nothing."""
+    """Returns the options of the request that diagnostics do not repeat."""
     fit = OperatorFit()
     if "duplicates" in request:
         fit["duplicates"] = DuplicatePolicy(request["duplicates"])
@@ -107,7 +116,7 @@ def _unreported(request: Mapping[str, Any]) -> OperatorFit:
 
 
 def _own_copy(numbers: npt.ArrayLike | None) -> Array | None:
-    """Returns a read-only copy of numbers, which the caller cannot change."""
+    """Returns a read-only float64 copy, so that later changes to the caller's array do not matter."""
     if numbers is None:
         return None
     copy = np.array(numbers, dtype=np.float64)
