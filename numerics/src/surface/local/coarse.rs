@@ -15,8 +15,8 @@ use crate::solver::{Solver, System};
 use crate::sums::jets::JetOrder;
 use crate::sums::regularization::Regularization;
 
-/// A part of a cloud whose signature function says which side of the surface is outward.
-pub struct Coarse {
+/// A thinned cloud with kernel and α. Its signature function tells which side of the full surface is outward.
+pub struct CoarseCloud {
     /// The points, ascending. No two coincide.
     pub points: Vec<usize>,
     pub kernel: Kernel,
@@ -25,9 +25,10 @@ pub struct Coarse {
     cloud: Cloud,
 }
 
-impl Coarse {
-    /// Chooses `count` points that are spread as the cloud is, or a sixth of a small cloud and at most 6,000
-    /// if that is `None`. `noise` is the standard deviation of the points across the surface, unit L.
+impl CoarseCloud {
+    /// Selects `count` points, spread as the cloud is. By default n/6, at least 600 and at most 6,000 (all
+    /// points of smaller clouds). Duplicates are merged, so fewer may remain. `noise` is the standard
+    /// deviation of the points across the surface, unit L.
     ///
     /// # Errors
     /// Returns [`NumericsError::Cancelled`].
@@ -44,6 +45,7 @@ impl Coarse {
             coarse = merged;
         }
         let sampling = Sampling::of(&coarse, observer)?;
+        // The closure is called only if the purpose needs the noise.
         let (kernel, alpha) = default_fit(sampling.scales(), Purpose::Normals, || noise)?;
         Ok(Self { points, kernel, alpha, cloud: coarse })
     }
@@ -52,7 +54,9 @@ impl Coarse {
     /// They point outward on closed clouds.
     ///
     /// # Errors
-    /// Returns [`NumericsError::Cancelled`]. Errors of the fit do not occur with this kernel and α.
+    /// Returns [`NumericsError::Cancelled`] and [`NumericsError::OutOfMemory`]. Other errors of the fit do not
+    /// occur: regularised Laplace is positive definite in every dimension, no two points coincide, and α is
+    /// 1e-3 or more. So the condition is below 1e7 for 6,000 points.
     fn directions_at(self, cloud: &Cloud, observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
         let regularization = Regularization::uniform(self.alpha)?;
         let system = System::new(Arc::new(self.cloud), self.kernel, regularization)?;
@@ -64,14 +68,14 @@ impl Coarse {
     }
 }
 
-/// Computes directions outward of the surface at the points, `[n, d]`, from a [`Coarse`] part of them.
+/// Computes directions outward of the surface at the points, `[n, d]`, from a [`CoarseCloud`] of them.
 ///
 /// # Errors
-/// Returns [`NumericsError::Cancelled`].
+/// Returns [`NumericsError::Cancelled`] and [`NumericsError::OutOfMemory`].
 pub(super) fn outward_directions(
     cloud: &Cloud,
     noise: f64,
     observer: &dyn Observer,
 ) -> Result<Vec<f64>, NumericsError> {
-    Coarse::of(cloud, None, noise, observer)?.directions_at(cloud, observer)
+    CoarseCloud::of(cloud, None, noise, observer)?.directions_at(cloud, observer)
 }

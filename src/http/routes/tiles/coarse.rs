@@ -18,7 +18,7 @@ use crate::http::state::app::App;
 use crate::http::wire::read::points::Points;
 use crate::store::Owner;
 use gramian_numerics::machine::price::Price;
-use gramian_numerics::surface::local::coarse::Coarse;
+use gramian_numerics::surface::local::coarse::CoarseCloud;
 use gramian_numerics::surface::price::coarse_price;
 
 /// A cloud, and how noisy it is.
@@ -28,7 +28,7 @@ pub struct CoarseRequest {
     /// The points of the cloud, or some of a large one, chosen evenly.
     #[schema(value_type = Vec<Vec<f64>>, min_items = 1)]
     pub points: Points,
-    /// The number of points to choose. Default: a sixth of a small cloud, and at most 6,000.
+    /// The number of points to choose. Default: a sixth, at least 600 and at most 6,000; all of a smaller cloud.
     #[schema(minimum = 1)]
     pub count: Option<usize>,
     /// The standard deviation of the noise of the points across the surface. Default: 0.
@@ -86,8 +86,8 @@ impl Direct for CoarseRequest {
         let cloud = planner.unregistered(self.points, "/points")?;
         let refuse =
             |error| Problem::from_numerics(error, Pointers { points: "/points", ..Pointers::REQUEST });
-        let coarse = Coarse::of(&cloud, self.count, noise, observer).map_err(refuse)?;
-        let Coarse { points, kernel, alpha, .. } = coarse;
+        let coarse = CoarseCloud::of(&cloud, self.count, noise, observer).map_err(refuse)?;
+        let CoarseCloud { points, kernel, alpha, .. } = coarse;
         Ok(CoarseResponse { points, kernel: KernelUsed::scaled(&kernel, 1.0), alpha })
     }
 }
