@@ -1,9 +1,10 @@
 //! Half-integer Matérn kernels, ν = p + ½: φ = e^{−s} θ_p(s)/θ_p(0), s = √(2ν q).
 //!
-//! The θ_p are the reverse Bessel polynomials. A derivative in q only lowers the index:
-//! d/dq [e^{−s} θ_p] = −ν e^{−s} θ_{p−1}. This follows from s^ν K_ν(s) = √(π/2) e^{−s} θ_p(s) and
-//! (s^ν K_ν)′ = −s · s^{ν−1}K_{ν−1} (Abramowitz and Stegun 1964, 9.6.28; Rasmussen and Williams 2006,
-//! eq. 4.16).
+//! The θ_m are the reverse Bessel polynomials. A derivative in q only lowers the index. For s = √(2ν q) with ν
+//! fixed and any index m: d/dq [e^{−s} θ_m] = −ν e^{−s} θ_{m−1}. Hence φ′ ∝ −ν e^{−s} θ_{p−1} and
+//! φ″ ∝ ν² e^{−s} θ_{p−2}. With μ = m + ½, this follows from s^μ K_μ(s) = √(π/2) e^{−s} θ_m(s),
+//! (s^μ K_μ)′ = −s · s^{μ−1}K_{μ−1} and ds/dq = ν/s (Abramowitz and Stegun 1964, 9.6.28; Rasmussen and
+//! Williams 2006, eq. 4.16).
 
 use pulp::Simd;
 
@@ -17,7 +18,7 @@ use crate::points::sampling::Scales;
 /// The greatest order p of a Matérn kernel, ν = p + ½.
 pub const MAX_MATERN_ORDER: u8 = 8;
 
-/// Bound on s: e^{−s} is 0 in float64 there, and no power of s that multiplies it overflows.
+/// Value at which s is cut off: e^{−s} is 0 in float64 there, and no power of s that multiplies it overflows.
 const FAR: f64 = 1e3;
 
 pub(super) struct Matern {
@@ -28,7 +29,7 @@ impl Profiles for Matern {
     #[inline(always)]
     fn run<S: Simd>(self, pairs: impl Pairs<S>) {
         match self.order {
-            // Here s = r, so the formula is that of Laplace. Sharing it leaves one loop less to compile.
+            // Here s = √q, so φ = e^{−√q} is that of Laplace with ε = 0. Sharing it saves compiling a loop.
             0 => Laplace { epsilon: 0.0 }.run(pairs),
             1 => OfOrder::<1>.run(pairs),
             2 => OfOrder::<2>.run(pairs),
@@ -94,6 +95,7 @@ fn profile<S: Simd>(q: Pack<S>, order: u8) -> [Pack<S>; 3] {
     // `lowest`, `lower` and `theta` are θ_{p−2}, θ_{p−1} and θ_p, starting at p = 1. There θ_{−1} = 1/s,
     // which only order 1 uses. Each turn raises p by 1: θ_{p+1} = (2p + 1) θ_p + s² θ_{p−1}.
     let (mut lowest, mut lower, mut theta) = (if order == 1 { inverse } else { one }, one, 1.0 + s);
+    // θ_p(0) = 1 · 3 · … · (2p − 1).
     let mut at_zero = 1.0;
     for p in 1..order {
         let odd = f64::from(2 * p + 1);

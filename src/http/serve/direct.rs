@@ -1,4 +1,4 @@
-//! The way of a compute request that needs no model: read, admit, parse, compute, encode.
+//! Serves compute requests that need no model: read, admit, parse, compute, encode.
 
 use std::sync::Arc;
 
@@ -19,12 +19,12 @@ use crate::store::Owner;
 use gramian_numerics::machine::price::Price;
 
 /// A request that needs no model.
-pub trait Direct: DeserializeOwned + Send + 'static {
+pub trait DirectOperation: DeserializeOwned + Send + 'static {
     /// Operation id in the `OpenAPI` document.
     const NAME: &'static str;
     type Answer: Serialize + Send + 'static;
 
-    /// The price of the computation.
+    /// Bytes and flops of the computation, known from the request alone.
     fn price(&self) -> Price;
 
     /// Checks the request and computes its answer on the pool.
@@ -38,13 +38,17 @@ pub trait Direct: DeserializeOwned + Send + 'static {
 ///
 /// # Errors
 /// Returns the [`Problem`] for the client.
-pub async fn serve<D: Direct>(app: Arc<App>, owner: Owner, request: Request) -> Result<Response, Problem> {
+pub async fn serve<D: DirectOperation>(
+    app: Arc<App>,
+    owner: Owner,
+    request: Request,
+) -> Result<Response, Problem> {
     let (parts, body) = request.into_parts();
     let intake = read_body(&app, owner, &parts.headers, body, &REQUEST_FORMATS).await?;
     let admission = app.compute.admit(owner)?;
-    let (shared, flops) = (app.clone(), intake.body.flops_to_parse());
+    let (shared, flops_to_parse) = (app.clone(), intake.body.flops_to_parse());
     let parse = move |observer: &JobObserver| intake.parse::<D>(&shared, observer);
-    let (request, mut memory) = app.compute.run(&admission, flops, parse).await?.0?;
+    let (request, mut memory) = app.compute.run(&admission, flops_to_parse, parse).await?.0?;
     let Price { n_bytes, flops } = request.price();
     if !memory.try_grow(n_bytes) {
         return Err(app.compute.out_of_memory());
@@ -53,8 +57,9 @@ pub async fn serve<D: Direct>(app: Arc<App>, owner: Owner, request: Request) -> 
     let shared = app.clone();
     let compute = move |observer: &JobObserver| {
         let answer = request.compute(&Planner::new(&shared, owner), observer)?;
+        // Request and working memory are freed. The answer is no larger than its request, and is not counted.
         drop(memory);
-        // Answers may be long, so they are encoded here as well. A null in one would be a bug.
+        // Encoded on the pool, since answers may be long. NaN would become null, which is a bug here.
         to_vec(&answer).map_err(|HasNull| Problem::internal())
     };
     let text = app.compute.run(&admission, flops, compute).await?.0?;

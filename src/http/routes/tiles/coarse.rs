@@ -12,7 +12,7 @@ use crate::http::compute::JobObserver;
 use crate::http::fields::KernelUsed;
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::{Pointers, Problem};
-use crate::http::serve::direct::{Direct, serve};
+use crate::http::serve::direct::{DirectOperation, serve};
 use crate::http::serve::planner::Planner;
 use crate::http::state::app::App;
 use crate::http::wire::read::points::Points;
@@ -67,7 +67,7 @@ pub async fn choose_coarse_cloud(
     serve::<CoarseRequest>(app, owner, request).await
 }
 
-impl Direct for CoarseRequest {
+impl DirectOperation for CoarseRequest {
     const NAME: &'static str = "choose_coarse_cloud";
     type Answer = CoarseResponse;
 

@@ -12,7 +12,7 @@ use super::fields::{Border, Region};
 use crate::http::compute::JobObserver;
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::{Pointers, Problem};
-use crate::http::serve::direct::{Direct, serve};
+use crate::http::serve::direct::{DirectOperation, serve};
 use crate::http::serve::planner::Planner;
 use crate::http::state::app::App;
 use crate::store::Owner;
@@ -79,7 +79,7 @@ pub async fn choose_sides(
     serve::<SidesRequest>(app, owner, request).await
 }
 
-impl Direct for SidesRequest {
+impl DirectOperation for SidesRequest {
     const NAME: &'static str = "choose_sides";
     type Answer = SidesResponse;
 
