@@ -136,7 +136,7 @@ pub(crate) fn is_far(squared_distance: f64, spacing: f64) -> bool {
 /// Returns whether ∇u, which is not rounding (T1), is still no normal at a query.
 ///
 /// Either it has no direction at the scale of the sampling (T2), or it is oblique to a reliable quadric.
-pub(crate) fn is_no_normal(
+pub(crate) fn lacks_normal(
     jets: &Jets,
     query: usize,
     spacing: f64,

@@ -1,4 +1,5 @@
-//! Normals at the points before their signs are made consistent.
+//! Unit normals at the points, signed where the signature function tells the side. `orientation` decides the
+//! rest.
 
 use super::function::Signature;
 use crate::error::Result;
@@ -8,14 +9,14 @@ use crate::points::cloud::Cloud;
 use crate::points::local_quadrics::LocalQuadrics;
 use crate::points::sampling::Sampling;
 use crate::sums::jets::{JetOrder, Jets};
-use crate::surface::degeneracy::is_no_normal;
+use crate::surface::degeneracy::lacks_normal;
 use crate::surface::orientation::Directions;
 
 /// Step of the difference quotient along a local normal, in spacings, for kernels without a gradient at the
 /// points.
 const DIFFERENCE_STEP: f64 = 0.25;
 
-/// Computes normals from the signature function and the quadrics, before their signs are made consistent.
+/// Computes unit normals at the points, signed where the signature function tells the side.
 ///
 /// # Errors
 /// Returns the errors of [`crate::function::interpolant::Interpolant::at`].
@@ -36,6 +37,8 @@ pub(crate) fn directions(
     Ok(Directions { normals, has_sign, is_at_rim: (0..n).map(is_at_rim).collect() })
 }
 
+/// Computes normals along −∇u. Where ∇u is not normal to the surface, the normal is that of the quadric, with
+/// an unknown sign, or zero where there is no quadric.
 fn along_gradients(
     signature: &Signature,
     jets: &Jets,
@@ -46,13 +49,15 @@ fn along_gradients(
     let (mut normals, mut has_sign) = (vec![0.0; n * d], vec![false; n]);
     for (point, slot) in normals.chunks_exact_mut(d).enumerate() {
         let quadric = quadrics.at(point);
-        if signature.is_rounding(point) || is_no_normal(jets, point, sampling.spacing(point), quadric) {
+        if signature.is_gradient_rounding_error(point)
+            || lacks_normal(jets, point, sampling.spacing(point), quadric)
+        {
             quadric.iter().for_each(|quadric| slot.copy_from_slice(quadric.normal));
             continue;
         }
         let gradient = jets.gradient(point);
         let length = norm(gradient);
-        slot.iter_mut().zip(gradient).for_each(|(n, g)| *n = -g / length);
+        slot.iter_mut().zip(gradient).for_each(|(c, g)| *c = -g / length);
         has_sign[point] = true;
     }
     (normals, has_sign)
@@ -60,7 +65,7 @@ fn along_gradients(
 
 /// Computes normals for kernels without a gradient at the points.
 ///
-/// The sign comes from `u(x + δn) − u(x − δn)`, n the normal of the quadric. The kink of the kernel at x is
+/// The sign comes from `u(x + δν) − u(x − δν)`, ν the normal of the quadric. The kink of the kernel at x is
 /// even, so it drops out.
 fn along_quadrics(
     signature: &Signature,
@@ -76,17 +81,18 @@ fn along_quadrics(
         for (point, x) in moved.chunks_exact_mut(d).enumerate() {
             let step = side * DIFFERENCE_STEP * sampling.spacing(point);
             let normal = quadrics.at(point).map(|quadric| quadric.normal);
-            x.iter_mut().zip(normal.into_iter().flatten()).for_each(|(x, n)| *x += step * n);
+            x.iter_mut().zip(normal.into_iter().flatten()).for_each(|(x, c)| *x += step * c);
         }
         function.at(&Cloud::new(moved, d)?, JetOrder::Value, observer)
     };
-    let (outside, inside) = (at(1.0)?, at(-1.0)?);
+    let (ahead, behind) = (at(1.0)?, at(-1.0)?);
     let (mut normals, mut has_sign) = (vec![0.0; n * d], vec![false; n]);
     for (point, slot) in normals.chunks_exact_mut(d).enumerate() {
         let Some(quadric) = quadrics.at(point) else { continue };
-        let slope = outside.value(point) - inside.value(point);
+        // u is greater inside than outside, so a normal along which u grows points inward and is turned.
+        let slope = ahead.value(point) - behind.value(point);
         let sign = if slope > 0.0 { -1.0 } else { 1.0 };
-        slot.iter_mut().zip(quadric.normal).for_each(|(n, f)| *n = sign * f);
+        slot.iter_mut().zip(quadric.normal).for_each(|(c, of_quadric)| *c = sign * of_quadric);
         has_sign[point] = slope != 0.0;
     }
     Ok((normals, has_sign))

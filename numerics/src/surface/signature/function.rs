@@ -78,8 +78,8 @@ impl Signature {
         self.at_points.as_ref().map(|at_points| &at_points.jets)
     }
 
-    /// Returns whether ∇u at a point is rounding, and false where there is no ∇u.
-    pub(crate) fn is_rounding(&self, point: usize) -> bool {
+    /// Returns whether ∇u at a point is rounding error, and false where there is no ∇u.
+    pub(crate) fn is_gradient_rounding_error(&self, point: usize) -> bool {
         self.at_points.as_ref().is_some_and(|at_points| at_points.is_rounding[point])
     }
 

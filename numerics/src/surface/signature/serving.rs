@@ -20,7 +20,7 @@ use crate::points::neighbours::Neighbour;
 use crate::points::quadric::n_quadric_neighbours;
 use crate::sums::jets::{JetOrder, Jets};
 use crate::surface::curvature::principal_curvatures;
-use crate::surface::degeneracy::{DegeneracyReason, is_far, is_no_normal, is_weak, roundings};
+use crate::surface::degeneracy::{DegeneracyReason, is_far, is_weak, lacks_normal, roundings};
 use crate::surface::request::{GeometryRequest, Orientation, SurfaceModel};
 use crate::surface::served::{Served, ServedBy, Verdict};
 
@@ -49,7 +49,7 @@ pub(crate) fn serve(
     };
     let is_rounding = match &jets {
         Cow::Borrowed(_) => {
-            (0..queries.n_points()).map(|point| surface.signature.is_rounding(point)).collect()
+            (0..queries.n_points()).map(|point| surface.signature.is_gradient_rounding_error(point)).collect()
         }
         Cow::Owned(jets) if order == JetOrder::Hessian => {
             roundings(surface.signature(), queries, jets, observer)?
@@ -218,7 +218,7 @@ impl Service<'_> {
             && self.surface.is_thread(site.x);
         is_on_thread
             || self.is_rounding[site.query]
-            || is_no_normal(&self.jets, site.query, site.spacing, quadric)
+            || lacks_normal(&self.jets, site.query, site.spacing, quadric)
     }
 
     /// Returns whether the offset model is preferred for curvatures: the gradient is weak, and the neighbours
