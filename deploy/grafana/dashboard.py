@@ -87,9 +87,8 @@ def dashboard():
 def main():
     text = json.dumps(dashboard(), indent=2, ensure_ascii=False) + "\n"
     if sys.argv[1:] == ["--check"]:
-        sys.exit(
-            0 if FILE.exists() and FILE.read_text() == text else "dashboard.json is old: run deploy/grafana/panels.py"
-        )
+        is_current = FILE.exists() and FILE.read_text() == text
+        sys.exit(0 if is_current else "dashboard.json is old: run deploy/grafana/dashboard.py")
     FILE.write_text(text)
 
 

@@ -4,12 +4,12 @@ deploy/test sends each query to a Prometheus that scrapes replicas under load.
 """
 
 # $instance is the selection at the top of the dashboard.
-OF = 'job="gramian", instance=~"$instance"'
+SELECTED = 'job="gramian", instance=~"$instance"'
 
 
 def rate(family, labels="", by=""):
     """Returns the query for a counter's rate per second, summed over all labels except those in `by`."""
-    labels = f"{OF}, {labels}" if labels else OF
+    labels = f"{SELECTED}, {labels}" if labels else SELECTED
     return f"sum {f'by ({by}) ' if by else ''}(rate({family}{{{labels}}}[$__rate_interval]))"
 
 
@@ -18,21 +18,21 @@ def share(family, labels):
     return f"({rate(family, labels)} or vector(0)) / {rate(family)}"
 
 
-def quantile(share, by=""):
+def quantile(level, by=""):
     """Returns the query for a quantile of the time of requests under /v1."""
     buckets = rate("gramian_http_request_duration_seconds_bucket", 'route=~"/v1/.*"', f"le{by and ', ' + by}")
-    return f"histogram_quantile({share}, {buckets})"
+    return f"histogram_quantile({level}, {buckets})"
 
 
 def used(part):
     """Returns the query for the used share of a part of the memory."""
-    bytes_of = f'_bytes{{{OF}, part="{part}"}}'
-    return f"gramian_memory_used{bytes_of} / gramian_memory_limit{bytes_of}"
+    suffix = f'_bytes{{{SELECTED}, part="{part}"}}'
+    return f"gramian_memory_used{suffix} / gramian_memory_limit{suffix}"
 
 
 def gauge(family, labels=""):
     """Returns the query for the current value of a gauge on each replica."""
-    return f"{family}{{{OF}{labels and ', ' + labels}}}"
+    return f"{family}{{{SELECTED}{labels and ', ' + labels}}}"
 
 
 # Panels by row. A panel is a title, a unit, queries by legend, and a description.
@@ -41,16 +41,16 @@ ROWS = {
         ("Replicas up", "none", {"replicas": 'sum(up{job="gramian"})'}, "Of those that Prometheus knows."),
         ("Requests", "reqps", {"all": rate("gramian_http_requests_total")}, "Per second, probes included."),
         (
-            "Answers from a cached factor",
+            "Cache hits",
             "percentunit",
             {"hits": share("gramian_cache_requests_total", 'outcome="hit"')},
-            "Low where clients do not send Gramian-Cloud, or the cache is too small.",
+            "Share of answers whose model was cached. Low without Gramian-Cloud in requests, or if the cache is too small.",
         ),
         (
-            "Refused or failed",
+            "Server errors (5xx)",
             "percentunit",
             {"5xx": share("gramian_http_requests_total", 'status=~"5.."')},
-            "503 is repeated by the router and by clients.",
+            "503 is retried by the router and by clients.",
         ),
     ],
     "Requests": [
@@ -64,16 +64,16 @@ ROWS = {
         (
             "Time of requests",
             "s",
-            {"median": quantile(0.5), "95 %": quantile(0.95), "99 %": quantile(0.99)},
+            {"median": quantile(0.5), "p95": quantile(0.95), "p99": quantile(0.99)},
             "From the head of a request to the head of its answer, under /v1.",
         ),
-        ("Time by route, 95 %", "s", {"{{route}}": quantile(0.95, "route")}, ""),
+        ("Time by route, p95", "s", {"{{route}}": quantile(0.95, "route")}, ""),
         ("Refusals by type", "reqps", {"{{type}}": rate("gramian_problems_total", by="type")}, ""),
         (
-            "Rate limited",
+            "Rate-limited (429)",
             "reqps",
             {"{{instance}}": rate("gramian_rate_limited_total", by="instance")},
-            "Answered 429.",
+            "Requests beyond the limits of their key.",
         ),
     ],
     "Load": [
@@ -105,20 +105,25 @@ ROWS = {
             "Beside the threads of each lane, gramian_compute_threads.",
         ),
     ],
-    "Factors and memory": [
+    "Models and memory": [
         (
             "Answers by cache outcome",
             "reqps",
             {"{{outcome}}": rate("gramian_cache_requests_total", by="outcome")},
-            "collapsed: another request was computing it.",
+            "hit, miss, or collapsed: another request was computing the model.",
         ),
-        ("Solvers prepared", "ops", {"{{kind}}": rate("gramian_solvers_prepared_total", by="kind")}, ""),
-        ("Kept", "none", {"{{instance}} {{part}}": gauge("gramian_cache_entries")}, "Clouds, and solvers (cache)."),
+        ("Models prepared", "ops", {"{{kind}}": rate("gramian_solvers_prepared_total", by="kind")}, ""),
+        (
+            "Entries kept",
+            "none",
+            {"{{instance}} {{part}}": gauge("gramian_cache_entries")},
+            "Clouds, and models (part `cache`).",
+        ),
         (
             "Evicted",
             "ops",
             {"{{instance}} {{part}}": rate("gramian_cache_evictions_total", by="instance, part")},
-            "Entries evicted to make room. If as many are evicted as prepared, the cache is too small.",
+            "Entries evicted to make room. If as many models are evicted as prepared, the cache is too small.",
         ),
         (
             "Memory by part",
@@ -151,7 +156,7 @@ ROWS = {
         (
             "Store: damaged objects",
             "none",
-            {"{{instance}}": f"sum by (instance) (increase(gramian_store_damaged_total{{{OF}}}[$__range]))"},
+            {"{{instance}}": f"sum by (instance) (increase(gramian_store_damaged_total{{{SELECTED}}}[$__range]))"},
             "",
         ),
         (
