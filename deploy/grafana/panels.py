@@ -44,7 +44,7 @@ ROWS = {
             "Cache hits",
             "percentunit",
             {"hits": share("gramian_cache_requests_total", 'outcome="hit"')},
-            "Share of answers whose model was cached. Low without Gramian-Cloud in requests, or if the cache is too small.",
+            "Share of answers whose model was cached. Low if clients omit Gramian-Cloud or the cache is too small.",
         ),
         (
             "Server errors (5xx)",

@@ -110,7 +110,7 @@ impl Activity {
     /// answer.
     pub fn enter(self: &Arc<Self>) -> InFlight {
         self.n_in_flight.fetch_add(1, Relaxed);
-        // Pauses the clock and keeps the debt: the client may wait for this answer before it reads the others.
+        // Pauses the clock and keeps the debt: the client may wait for this answer before it reads others.
         self.streams.took(0);
         // The next head has arrived, so the refused request before it was read to its end.
         self.is_answered_early.store(false, Relaxed);

@@ -35,8 +35,8 @@ pub use fair_cache::Counts;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Owner(pub usize);
 
-/// Returns the most of `whole` that one owner may hold, so that no owner can shut out the others: half, rounded
-/// up. An owner without others has no bound beyond `whole` itself, which is checked separately.
+/// Returns the most of `whole` that one owner may hold, so that no owner can shut out the others: half,
+/// rounded up. An owner without others has no bound beyond `whole` itself, which is checked separately.
 pub fn share_of_one(whole: usize, n_owners: usize) -> usize {
     if n_owners > 1 { whole.div_ceil(2) } else { usize::MAX }
 }

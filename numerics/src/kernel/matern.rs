@@ -1,7 +1,7 @@
 //! Half-integer Matérn kernels, ν = p + ½: φ = e^{−s} θ_p(s)/θ_p(0), s = √(2ν q).
 //!
-//! The θ_m are the reverse Bessel polynomials. A derivative in q only lowers the index. For s = √(2ν q) with ν
-//! fixed and any index m: d/dq [e^{−s} θ_m] = −ν e^{−s} θ_{m−1}. Hence φ′ ∝ −ν e^{−s} θ_{p−1} and
+//! The θ_m are the reverse Bessel polynomials. A derivative in q only lowers the index. For s = √(2ν q) with
+//! ν fixed and any index m: d/dq [e^{−s} θ_m] = −ν e^{−s} θ_{m−1}. Hence φ′ ∝ −ν e^{−s} θ_{p−1} and
 //! φ″ ∝ ν² e^{−s} θ_{p−2}. With μ = m + ½, this follows from s^μ K_μ(s) = √(π/2) e^{−s} θ_m(s),
 //! (s^μ K_μ)′ = −s · s^{μ−1}K_{μ−1} and ds/dq = ν/s (Abramowitz and Stegun 1964, 9.6.28; Rasmussen and
 //! Williams 2006, eq. 4.16).

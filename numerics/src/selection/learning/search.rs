@@ -156,8 +156,8 @@ impl<'a> Search<'a> {
         Ok(begin)
     }
 
-    /// Returns `−ln(likelihood · prior on noise)`, up to a constant. Infinite if the cell does not explain the
-    /// values in float64.
+    /// Returns `−ln(likelihood · prior on noise)`, up to a constant. Infinite if the cell does not explain
+    /// the values in float64.
     ///
     /// # Errors
     /// `NumericsError::Cancelled`.

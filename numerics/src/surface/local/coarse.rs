@@ -54,9 +54,9 @@ impl CoarseCloud {
     /// They point outward on closed clouds.
     ///
     /// # Errors
-    /// Returns [`NumericsError::Cancelled`] and [`NumericsError::OutOfMemory`]. Other errors of the fit do not
-    /// occur: regularised Laplace is positive definite in every dimension, no two points coincide, and α is
-    /// 1e-3 or more. So the condition is below 1e7 for 6,000 points.
+    /// Returns [`NumericsError::Cancelled`] and [`NumericsError::OutOfMemory`]. Other errors of the fit do
+    /// not occur: regularised Laplace is positive definite in every dimension, no two points coincide, and α
+    /// is 1e-3 or more. So the condition is below 1e7 for 6,000 points.
     fn directions_at(self, cloud: &Cloud, observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
         let regularization = Regularization::uniform(self.alpha)?;
         let system = System::new(Arc::new(self.cloud), self.kernel, regularization)?;

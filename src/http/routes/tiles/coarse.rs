@@ -28,7 +28,7 @@ pub struct CoarseRequest {
     /// The points of the cloud, or some of a large one, chosen evenly.
     #[schema(value_type = Vec<Vec<f64>>, min_items = 1)]
     pub points: Points,
-    /// The number of points to choose. Default: a sixth, at least 600 and at most 6,000; all of a smaller cloud.
+    /// The number of points to choose. Default: a sixth, at least 600 (or all points) and at most 6,000.
     #[schema(minimum = 1)]
     pub count: Option<usize>,
     /// The standard deviation of the noise of the points across the surface. Default: 0.
