@@ -126,6 +126,7 @@ async fn tiles_that_cannot_be_are_refused_by_their_place() {
         ("/v1/regions", json!({"cloud": cloud, "own": [0], "coarse": [60]}), "/coarse/0"),
         ("/v1/coarse", json!({"points": points, "count": 0}), "/count"),
         ("/v1/coarse", json!({"points": points, "noise_deviation": -1.0}), "/noise_deviation"),
+        ("/v1/coarse", json!({"points": points, "noise_deviation": 1e308}), "/noise_deviation"),
         ("/v1/sides", json!({"tiles": [tile(0), tile(1)], "links": []}), "/tiles/1"),
         ("/v1/sides", json!({"tiles": [tile(0), tile(0)], "links": [link(1), link(2)]}), "/links/1"),
     ];

@@ -200,7 +200,7 @@ def test_other_refusals_say_what_is_wrong() -> None:
         KernelRegressor(alpha=[1, 2, 3]).fit(X, Y)
     with pytest.raises(ValueError, match="did you mean 'gauss'"):
         KernelRegressor("gaus").fit(X, Y)  # type: ignore[arg-type]
-    with pytest.raises(gramian.Problem, match="the local solver knows each query by itself and has no covariance"):
+    with pytest.raises(gramian.Problem, match="the local solver treats each query separately, so it has no covariance"):
         KernelRegressor(solver="local").fit(X, Y).predict(QUERIES, return_cov=True)
 
 

@@ -18,6 +18,7 @@ use crate::http::state::app::App;
 use crate::http::wire::read::points::Points;
 use crate::store::Owner;
 use gramian_numerics::machine::price::Price;
+use gramian_numerics::sums::regularization::Regularization;
 use gramian_numerics::surface::local::coarse::CoarseCloud;
 use gramian_numerics::surface::price::coarse_price;
 
@@ -87,6 +88,10 @@ impl DirectOperation for CoarseRequest {
         let refuse =
             |error| Problem::from_numerics(error, Pointers { points: "/points", ..Pointers::REQUEST });
         let coarse = CoarseCloud::of(&cloud, self.count, noise, observer).map_err(refuse)?;
+        if Regularization::uniform(coarse.alpha).is_err() {
+            let detail = "is too large beside the spacing of the points: alpha exceeds 1e300";
+            return Err(Problem::invalid_request("/noise_deviation", detail));
+        }
         let CoarseCloud { points, kernel, alpha, .. } = coarse;
         Ok(CoarseResponse { points, kernel: KernelUsed::scaled(&kernel, 1.0), alpha })
     }
