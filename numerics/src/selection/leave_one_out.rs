@@ -15,8 +15,7 @@ use super::parameters::Hyperparameters;
 use super::subject::{Observations, Subject};
 use crate::error::{NumericsError, Result};
 use crate::observer::{Observer, Stage};
-use crate::points::cloud::Cloud;
-use crate::solver::trend::{Mean, Trend};
+use crate::solver::trend::Trend;
 use crate::solver::{Solution, Solver};
 use crate::sums::regularization::Regularization;
 

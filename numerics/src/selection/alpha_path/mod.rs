@@ -20,12 +20,11 @@ use crate::kernel::Kernel;
 use crate::machine::parallelism::parallelism;
 use crate::machine::vector::dot;
 use crate::observer::{Observer, Stage};
-use crate::points::cloud::Cloud;
 use crate::selection::criterion::{Criterion, Parts};
 use crate::selection::evaluation::Evaluator;
 use crate::selection::parameters::Hyperparameters;
 use crate::selection::subject::{Observations, Subject};
-use crate::solver::trend::{Mean, solve_gram};
+use crate::solver::trend::solve_gram;
 use crate::sums::regularization::Regularization;
 use spectrum::Spectrum;
 

@@ -4,7 +4,9 @@ use super::*;
 use crate::error::NumericsError;
 use crate::kernel::Family;
 use crate::observer::Unobserved;
+use crate::points::cloud::Cloud;
 use crate::selection::evaluation::Evaluator;
+use crate::solver::trend::Mean;
 use crate::testing::Random;
 
 const CRITERIA: [Criterion; 3] =

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use super::*;
 use crate::kernel::{Family, Kernel};
 use crate::observer::Unobserved;
+use crate::points::cloud::Cloud;
 use crate::solver::System;
+use crate::solver::trend::Mean;
 use crate::testing::Random;
 
 const N: usize = 25;

@@ -4,6 +4,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::*;
 use crate::observer::Unobserved;
+use crate::points::cloud::Cloud;
+use crate::solver::trend::Mean;
 use crate::sums::regularization::Regularization;
 use crate::testing::Random;
 
