@@ -178,7 +178,7 @@ They may have any length but 0. The side they point to is outward. An empty list
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
     pub struct CoarseRequest {
-        ///The number of points to choose. Default: a sixth of a small cloud, and at most 6,000.
+        ///The number of points to choose. Default: a sixth, at least 600 (or all points) and at most 6,000.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub count: ::std::option::Option<::std::num::NonZeroU64>,
         ///The standard deviation of the noise of the points across the surface. Default: 0.
@@ -13669,8 +13669,8 @@ let response = client.compute_regions()
 
 Returns the unit normals ν = −∇u/|∇u| (outward) of the level surface of the signature function u, the
 interpolant of the constant 1. The cloud needs no mesh and no neighbourhoods. Signs are checked against
-the neighbours and repaired. Where the gradient of u vanishes, an offset model of the nearest points takes
-the place of u.
+the neighbours and repaired. Where ∇u vanishes, the nearest points and copies shifted by ±δ along their
+normals are interpolated instead (the offset model).
 
 Sends a `POST` request to `/v1/normals`
 
@@ -13687,9 +13687,10 @@ let response = client.compute_normals()
 
 Returns principal curvatures with their directions, mean curvatures and Gaussian curvatures. Principal
 curvatures are eigenvalues of the shape operator S = σPD²uP/|∇u| of the level surface of the signature
-function u. Where the gradient of u vanishes or is weak, an offset model of the nearest points takes the
-place of u. A sphere of radius r has curvatures +1/r with outward normals. Entries that the points around
-a query do not confirm are flagged.
+function u, where P projects onto the tangent space and σ = ±1 is such that σ∇u points along the normal. A
+sphere of radius r has curvatures +1/r with outward normals. Where ∇u vanishes or is too small to be
+trusted, the nearest points and copies shifted by ±δ along their normals are interpolated instead (the
+offset model). An entry that disagrees with the points around its query is listed in `degenerate`.
 
 Sends a `POST` request to `/v1/curvatures`
 

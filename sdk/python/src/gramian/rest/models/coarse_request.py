@@ -16,7 +16,8 @@ class CoarseRequest:
 
     Attributes:
         points (list[list[float]]): The points of the cloud, or some of a large one, chosen evenly.
-        count (int | Unset): The number of points to choose. Default: a sixth of a small cloud, and at most 6,000.
+        count (int | Unset): The number of points to choose. Default: a sixth, at least 600 (or all points) and at most
+            6,000.
         noise_deviation (float | Unset): The standard deviation of the noise of the points across the surface. Default:
             0.
     """

@@ -136,12 +136,12 @@ def sync_detailed(
     Args:
         body (CloudRequest): Points to register.
         body (File): The points, `[n, d]`, as little- or big-endian float64 or float32.
-        body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
-            tensors and a header of 64 KiB.
+        body (File): Safetensors. Each JSON array of numbers becomes an F64 or F32 tensor of the
+            same name, with dots for nesting (`cloud.points`). All other fields are JSON text in the
+            metadata entry `request`. At most 64 tensors; header at most 64 KiB.
         body (File): PLY 1.0, ascii or binary of either byte order. The properties x, y, z of
             element vertex are the points, and nx, ny, nz their normals if all three are there, of any
-            type of number; other properties and elements are passed over.
+            type of number; other properties and elements are ignored.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -177,12 +177,12 @@ def sync(
     Args:
         body (CloudRequest): Points to register.
         body (File): The points, `[n, d]`, as little- or big-endian float64 or float32.
-        body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
-            tensors and a header of 64 KiB.
+        body (File): Safetensors. Each JSON array of numbers becomes an F64 or F32 tensor of the
+            same name, with dots for nesting (`cloud.points`). All other fields are JSON text in the
+            metadata entry `request`. At most 64 tensors; header at most 64 KiB.
         body (File): PLY 1.0, ascii or binary of either byte order. The properties x, y, z of
             element vertex are the points, and nx, ny, nz their normals if all three are there, of any
-            type of number; other properties and elements are passed over.
+            type of number; other properties and elements are ignored.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -213,12 +213,12 @@ async def asyncio_detailed(
     Args:
         body (CloudRequest): Points to register.
         body (File): The points, `[n, d]`, as little- or big-endian float64 or float32.
-        body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
-            tensors and a header of 64 KiB.
+        body (File): Safetensors. Each JSON array of numbers becomes an F64 or F32 tensor of the
+            same name, with dots for nesting (`cloud.points`). All other fields are JSON text in the
+            metadata entry `request`. At most 64 tensors; header at most 64 KiB.
         body (File): PLY 1.0, ascii or binary of either byte order. The properties x, y, z of
             element vertex are the points, and nx, ny, nz their normals if all three are there, of any
-            type of number; other properties and elements are passed over.
+            type of number; other properties and elements are ignored.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -252,12 +252,12 @@ async def asyncio(
     Args:
         body (CloudRequest): Points to register.
         body (File): The points, `[n, d]`, as little- or big-endian float64 or float32.
-        body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
-            tensors and a header of 64 KiB.
+        body (File): Safetensors. Each JSON array of numbers becomes an F64 or F32 tensor of the
+            same name, with dots for nesting (`cloud.points`). All other fields are JSON text in the
+            metadata entry `request`. At most 64 tensors; header at most 64 KiB.
         body (File): PLY 1.0, ascii or binary of either byte order. The properties x, y, z of
             element vertex are the points, and nx, ny, nz their normals if all three are there, of any
-            type of number; other properties and elements are passed over.
+            type of number; other properties and elements are ignored.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.

@@ -130,18 +130,19 @@ def sync_detailed(
     Principal
     curvatures are eigenvalues of the shape operator S = σPD²uP/|∇u| of the level surface of the
     signature
-    function u. Where the gradient of u vanishes or is weak, an offset model of the nearest points takes
-    the
-    place of u. A sphere of radius r has curvatures +1/r with outward normals. Entries that the points
-    around
-    a query do not confirm are flagged.
+    function u, where P projects onto the tangent space and σ = ±1 is such that σ∇u points along the
+    normal. A
+    sphere of radius r has curvatures +1/r with outward normals. Where ∇u vanishes or is too small to be
+    trusted, the nearest points and copies shifted by ±δ along their normals are interpolated instead
+    (the
+    offset model). An entry that disagrees with the points around its query is listed in `degenerate`.
 
     Args:
         body (CurvaturesRequest): A cloud that samples a hypersurface, and queries at which to
             compute its curvatures.
-        body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
-            tensors and a header of 64 KiB.
+        body (File): Safetensors. Each JSON array of numbers becomes an F64 or F32 tensor of the
+            same name, with dots for nesting (`cloud.points`). All other fields are JSON text in the
+            metadata entry `request`. At most 64 tensors; header at most 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -173,18 +174,19 @@ def sync(
     Principal
     curvatures are eigenvalues of the shape operator S = σPD²uP/|∇u| of the level surface of the
     signature
-    function u. Where the gradient of u vanishes or is weak, an offset model of the nearest points takes
-    the
-    place of u. A sphere of radius r has curvatures +1/r with outward normals. Entries that the points
-    around
-    a query do not confirm are flagged.
+    function u, where P projects onto the tangent space and σ = ±1 is such that σ∇u points along the
+    normal. A
+    sphere of radius r has curvatures +1/r with outward normals. Where ∇u vanishes or is too small to be
+    trusted, the nearest points and copies shifted by ±δ along their normals are interpolated instead
+    (the
+    offset model). An entry that disagrees with the points around its query is listed in `degenerate`.
 
     Args:
         body (CurvaturesRequest): A cloud that samples a hypersurface, and queries at which to
             compute its curvatures.
-        body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
-            tensors and a header of 64 KiB.
+        body (File): Safetensors. Each JSON array of numbers becomes an F64 or F32 tensor of the
+            same name, with dots for nesting (`cloud.points`). All other fields are JSON text in the
+            metadata entry `request`. At most 64 tensors; header at most 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -211,18 +213,19 @@ async def asyncio_detailed(
     Principal
     curvatures are eigenvalues of the shape operator S = σPD²uP/|∇u| of the level surface of the
     signature
-    function u. Where the gradient of u vanishes or is weak, an offset model of the nearest points takes
-    the
-    place of u. A sphere of radius r has curvatures +1/r with outward normals. Entries that the points
-    around
-    a query do not confirm are flagged.
+    function u, where P projects onto the tangent space and σ = ±1 is such that σ∇u points along the
+    normal. A
+    sphere of radius r has curvatures +1/r with outward normals. Where ∇u vanishes or is too small to be
+    trusted, the nearest points and copies shifted by ±δ along their normals are interpolated instead
+    (the
+    offset model). An entry that disagrees with the points around its query is listed in `degenerate`.
 
     Args:
         body (CurvaturesRequest): A cloud that samples a hypersurface, and queries at which to
             compute its curvatures.
-        body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
-            tensors and a header of 64 KiB.
+        body (File): Safetensors. Each JSON array of numbers becomes an F64 or F32 tensor of the
+            same name, with dots for nesting (`cloud.points`). All other fields are JSON text in the
+            metadata entry `request`. At most 64 tensors; header at most 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -252,18 +255,19 @@ async def asyncio(
     Principal
     curvatures are eigenvalues of the shape operator S = σPD²uP/|∇u| of the level surface of the
     signature
-    function u. Where the gradient of u vanishes or is weak, an offset model of the nearest points takes
-    the
-    place of u. A sphere of radius r has curvatures +1/r with outward normals. Entries that the points
-    around
-    a query do not confirm are flagged.
+    function u, where P projects onto the tangent space and σ = ±1 is such that σ∇u points along the
+    normal. A
+    sphere of radius r has curvatures +1/r with outward normals. Where ∇u vanishes or is too small to be
+    trusted, the nearest points and copies shifted by ±δ along their normals are interpolated instead
+    (the
+    offset model). An entry that disagrees with the points around its query is listed in `degenerate`.
 
     Args:
         body (CurvaturesRequest): A cloud that samples a hypersurface, and queries at which to
             compute its curvatures.
-        body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
-            tensors and a header of 64 KiB.
+        body (File): Safetensors. Each JSON array of numbers becomes an F64 or F32 tensor of the
+            same name, with dots for nesting (`cloud.points`). All other fields are JSON text in the
+            metadata entry `request`. At most 64 tensors; header at most 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.

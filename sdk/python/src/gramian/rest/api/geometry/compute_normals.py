@@ -130,16 +130,16 @@ def sync_detailed(
     the
     interpolant of the constant 1. The cloud needs no mesh and no neighbourhoods. Signs are checked
     against
-    the neighbours and repaired. Where the gradient of u vanishes, an offset model of the nearest points
-    takes
-    the place of u.
+    the neighbours and repaired. Where ∇u vanishes, the nearest points and copies shifted by ±δ along
+    their
+    normals are interpolated instead (the offset model).
 
     Args:
         body (NormalsRequest): A cloud that samples a hypersurface, and queries at which to
             compute its normals.
-        body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
-            tensors and a header of 64 KiB.
+        body (File): Safetensors. Each JSON array of numbers becomes an F64 or F32 tensor of the
+            same name, with dots for nesting (`cloud.points`). All other fields are JSON text in the
+            metadata entry `request`. At most 64 tensors; header at most 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -171,16 +171,16 @@ def sync(
     the
     interpolant of the constant 1. The cloud needs no mesh and no neighbourhoods. Signs are checked
     against
-    the neighbours and repaired. Where the gradient of u vanishes, an offset model of the nearest points
-    takes
-    the place of u.
+    the neighbours and repaired. Where ∇u vanishes, the nearest points and copies shifted by ±δ along
+    their
+    normals are interpolated instead (the offset model).
 
     Args:
         body (NormalsRequest): A cloud that samples a hypersurface, and queries at which to
             compute its normals.
-        body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
-            tensors and a header of 64 KiB.
+        body (File): Safetensors. Each JSON array of numbers becomes an F64 or F32 tensor of the
+            same name, with dots for nesting (`cloud.points`). All other fields are JSON text in the
+            metadata entry `request`. At most 64 tensors; header at most 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -207,16 +207,16 @@ async def asyncio_detailed(
     the
     interpolant of the constant 1. The cloud needs no mesh and no neighbourhoods. Signs are checked
     against
-    the neighbours and repaired. Where the gradient of u vanishes, an offset model of the nearest points
-    takes
-    the place of u.
+    the neighbours and repaired. Where ∇u vanishes, the nearest points and copies shifted by ±δ along
+    their
+    normals are interpolated instead (the offset model).
 
     Args:
         body (NormalsRequest): A cloud that samples a hypersurface, and queries at which to
             compute its normals.
-        body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
-            tensors and a header of 64 KiB.
+        body (File): Safetensors. Each JSON array of numbers becomes an F64 or F32 tensor of the
+            same name, with dots for nesting (`cloud.points`). All other fields are JSON text in the
+            metadata entry `request`. At most 64 tensors; header at most 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -246,16 +246,16 @@ async def asyncio(
     the
     interpolant of the constant 1. The cloud needs no mesh and no neighbourhoods. Signs are checked
     against
-    the neighbours and repaired. Where the gradient of u vanishes, an offset model of the nearest points
-    takes
-    the place of u.
+    the neighbours and repaired. Where ∇u vanishes, the nearest points and copies shifted by ±δ along
+    their
+    normals are interpolated instead (the offset model).
 
     Args:
         body (NormalsRequest): A cloud that samples a hypersurface, and queries at which to
             compute its normals.
-        body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
-            tensors and a header of 64 KiB.
+        body (File): Safetensors. Each JSON array of numbers becomes an F64 or F32 tensor of the
+            same name, with dots for nesting (`cloud.points`). All other fields are JSON text in the
+            metadata entry `request`. At most 64 tensors; header at most 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.

@@ -133,9 +133,9 @@ def sync_detailed(
     Args:
         body (SurfaceGradientMatrixRequest): A cloud of nodes on a surface, and queries for the
             rows of its surface gradient matrices.
-        body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
-            tensors and a header of 64 KiB.
+        body (File): Safetensors. Each JSON array of numbers becomes an F64 or F32 tensor of the
+            same name, with dots for nesting (`cloud.points`). All other fields are JSON text in the
+            metadata entry `request`. At most 64 tensors; header at most 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -170,9 +170,9 @@ def sync(
     Args:
         body (SurfaceGradientMatrixRequest): A cloud of nodes on a surface, and queries for the
             rows of its surface gradient matrices.
-        body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
-            tensors and a header of 64 KiB.
+        body (File): Safetensors. Each JSON array of numbers becomes an F64 or F32 tensor of the
+            same name, with dots for nesting (`cloud.points`). All other fields are JSON text in the
+            metadata entry `request`. At most 64 tensors; header at most 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -202,9 +202,9 @@ async def asyncio_detailed(
     Args:
         body (SurfaceGradientMatrixRequest): A cloud of nodes on a surface, and queries for the
             rows of its surface gradient matrices.
-        body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
-            tensors and a header of 64 KiB.
+        body (File): Safetensors. Each JSON array of numbers becomes an F64 or F32 tensor of the
+            same name, with dots for nesting (`cloud.points`). All other fields are JSON text in the
+            metadata entry `request`. At most 64 tensors; header at most 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -237,9 +237,9 @@ async def asyncio(
     Args:
         body (SurfaceGradientMatrixRequest): A cloud of nodes on a surface, and queries for the
             rows of its surface gradient matrices.
-        body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
-            tensors and a header of 64 KiB.
+        body (File): Safetensors. Each JSON array of numbers becomes an F64 or F32 tensor of the
+            same name, with dots for nesting (`cloud.points`). All other fields are JSON text in the
+            metadata entry `request`. At most 64 tensors; header at most 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.

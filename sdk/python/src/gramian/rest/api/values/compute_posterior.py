@@ -142,9 +142,9 @@ def sync_detailed(
     Args:
         body (PosteriorRequest): Noisy values at the points of a cloud, and queries for the
             posterior.
-        body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
-            tensors and a header of 64 KiB.
+        body (File): Safetensors. Each JSON array of numbers becomes an F64 or F32 tensor of the
+            same name, with dots for nesting (`cloud.points`). All other fields are JSON text in the
+            metadata entry `request`. At most 64 tensors; header at most 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -188,9 +188,9 @@ def sync(
     Args:
         body (PosteriorRequest): Noisy values at the points of a cloud, and queries for the
             posterior.
-        body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
-            tensors and a header of 64 KiB.
+        body (File): Safetensors. Each JSON array of numbers becomes an F64 or F32 tensor of the
+            same name, with dots for nesting (`cloud.points`). All other fields are JSON text in the
+            metadata entry `request`. At most 64 tensors; header at most 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -229,9 +229,9 @@ async def asyncio_detailed(
     Args:
         body (PosteriorRequest): Noisy values at the points of a cloud, and queries for the
             posterior.
-        body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
-            tensors and a header of 64 KiB.
+        body (File): Safetensors. Each JSON array of numbers becomes an F64 or F32 tensor of the
+            same name, with dots for nesting (`cloud.points`). All other fields are JSON text in the
+            metadata entry `request`. At most 64 tensors; header at most 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -273,9 +273,9 @@ async def asyncio(
     Args:
         body (PosteriorRequest): Noisy values at the points of a cloud, and queries for the
             posterior.
-        body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
-            tensors and a header of 64 KiB.
+        body (File): Safetensors. Each JSON array of numbers becomes an F64 or F32 tensor of the
+            same name, with dots for nesting (`cloud.points`). All other fields are JSON text in the
+            metadata entry `request`. At most 64 tensors; header at most 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
