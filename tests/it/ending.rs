@@ -104,7 +104,7 @@ async fn readers_are_waited_for_and_then_cut_without_an_end() {
     let (status, lines) = process.finish();
     assert!(began.elapsed() < Duration::from_secs(20));
     assert_eq!(status.code(), Some(0));
-    assert_eq!(logged(&lines, "are cut")["n_connections"], 1);
+    assert_eq!(logged(&lines, "are closed")["n_connections"], 1);
     received.clear();
     let outcome = sleeper.read_to_end(&mut received);
     assert!(outcome.is_err() || !received.ends_with(b"0\r\n\r\n"));

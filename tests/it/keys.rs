@@ -159,13 +159,13 @@ fn without_keys_nobody_else_is_served_unless_that_is_meant() {
     assert!(!ended.status.success() && told.contains("GRAMIAN_ALLOW_ANONYMOUS"), "{told}");
     let process = Process::of(gramian().args(["--bind", "0.0.0.0:0"]).env("GRAMIAN_ALLOW_ANONYMOUS", "1"));
     process.terminate();
-    logged(&process.finish().1, "there are no keys");
+    logged(&process.finish().1, "no keys are configured");
     let (_, lines) = key("one", "");
     let file = KeysFile::new("exposed", &[&lines]);
     let process =
         Process::of(gramian().args(["--bind", "0.0.0.0:0", "--keys-file", file.0.to_str().unwrap()]));
     process.terminate();
-    assert!(!process.finish().1.join("").contains("there are no keys"));
+    assert!(!process.finish().1.join("").contains("no keys are configured"));
 }
 
 #[test]
