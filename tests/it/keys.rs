@@ -80,7 +80,7 @@ async fn keys_of_a_file_are_replaced_without_a_restart() {
     assert_eq!((list(&process, &other).await.status, list(&process, &new).await.status), (401, 200));
     // An invalid file changes nothing.
     file.write(&[&lines_of_old, "oops"]);
-    while !process.lines.lock().unwrap().iter().any(|line| line.contains("keys stay as they were")) {
+    while !process.lines.lock().unwrap().iter().any(|line| line.contains("was not reloaded")) {
         tokio::task::yield_now().await;
     }
     assert_eq!((list(&process, &old).await.status, list(&process, &new).await.status), (401, 200));
