@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
+use std::time::Duration;
 
 use serde_json::json;
 
@@ -80,9 +81,12 @@ async fn keys_of_a_file_are_replaced_without_a_restart() {
     assert_eq!((list(&process, &other).await.status, list(&process, &new).await.status), (401, 200));
     // An invalid file changes nothing.
     file.write(&[&lines_of_old, "oops"]);
-    while !process.lines.lock().unwrap().iter().any(|line| line.contains("was not reloaded")) {
-        tokio::task::yield_now().await;
-    }
+    let refused = async {
+        while !process.lines.lock().unwrap().iter().any(|line| line.contains("was not reloaded")) {
+            tokio::task::yield_now().await;
+        }
+    };
+    tokio::time::timeout(Duration::from_secs(60), refused).await.expect("the file is refused in the log");
     assert_eq!((list(&process, &old).await.status, list(&process, &new).await.status), (401, 200));
     process.terminate();
     let text = process.finish().1.join("\n");
