@@ -123,7 +123,6 @@ def test_so_it_does_where_nothing_but_neighbours_is_fitted(method: str) -> None:
         said = [{"surface": "local"}, {"solver": "local"}]
     elif not method.endswith("_matrix") or "sparse" in method:
         said += [
-            {"kernel": "gauss", "alpha": 1e-6, "geometry": {"surface": "local"}},
             {"solver": "local"},
             {"solver": "local", "geometry": {"solver": "dense", "kernel": "gauss", "alpha": 1e-8}},
         ]

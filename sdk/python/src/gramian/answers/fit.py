@@ -66,6 +66,10 @@ def operator_fit_used(members: Members) -> OperatorFit:
     if isinstance(surface, Unset):
         surface = members.diagnostics
         fit = OperatorFit(solver=SolverChoice.LOCAL, **_unreported(members.request))
+    if surface.solver is SolverUsed.LOCAL:
+        # The service chose kernel and noise from the values. Leaving them out repeats that choice.
+        fit.pop("kernel", None)
+        fit.pop("alpha", None)
     return OperatorFit(**fit, geometry=_geometry_used(members.request, surface))
 
 
