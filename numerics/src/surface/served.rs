@@ -16,6 +16,8 @@ pub enum ServedBy {
 pub struct Deviations {
     /// True where a query has deviations, `[m]`.
     pub is_known: Vec<bool>,
+    /// Deviations of the surface along its normal, `[m]`, L.
+    pub height: Vec<f64>,
     /// Deviations of the angle of the normal, `[m]`, radians.
     pub normal: Vec<f64>,
     /// Deviations of the principal curvatures, `[m, d−1]`, 1/L.

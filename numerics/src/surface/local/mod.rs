@@ -148,8 +148,13 @@ impl LocalSurface {
         self.orientation
     }
 
-    pub(super) fn sampling(&self) -> &Sampling {
+    pub(crate) fn sampling(&self) -> &Sampling {
         &self.sampling
+    }
+
+    /// Geometry at the points, with outward normals.
+    pub(crate) fn at_points(&self) -> &PatchGeometry {
+        &self.at_points
     }
 
     pub fn patches(&self) -> &Patches {
@@ -363,6 +368,7 @@ fn deviations(geometry: &PatchGeometry, sign: f64, d: usize) -> Deviations {
     }
     Deviations {
         is_known: geometry.is_known.clone(),
+        height: geometry.height_deviations.clone(),
         normal: geometry.normal_deviations.clone(),
         principal,
         mean: curvatures.mean.clone(),
@@ -390,11 +396,12 @@ impl PatchGeometry {
 
     /// Bytes held on the heap.
     fn n_bytes(&self) -> usize {
-        let lists = [&self.normals, &self.shapes, &self.heights, &self.normal_deviations];
+        let vectors = [&self.normals, &self.shapes];
+        let numbers = [&self.heights, &self.height_deviations, &self.normal_deviations];
         let of_curvatures = |c: &CurvatureDeviations| {
             vec_bytes(&c.principal) + vec_bytes(&c.mean) + vec_bytes(&c.gaussian) + vec_bytes(&c.is_bent)
         };
-        lists.into_iter().map(vec_bytes).sum::<usize>()
+        vectors.into_iter().chain(numbers).map(vec_bytes).sum::<usize>()
             + vec_bytes(&self.is_known)
             + vec_bytes(&self.is_at_rim)
             + self.curvatures.as_ref().map_or(0, of_curvatures)

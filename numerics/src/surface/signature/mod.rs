@@ -156,6 +156,11 @@ impl SignatureSurface {
         Some(self.signature().solution.weights.iter().zip(diagonal).map(|(w, d)| (w / d).abs()).collect())
     }
 
+    /// Outward unit normals of the points, `[n, d]`, zero where unknown.
+    pub(crate) fn normals(&self) -> &[f64] {
+        &self.oriented.normals
+    }
+
     /// The outward unit normal of a point, zero where unknown.
     pub(crate) fn normal(&self, point: usize) -> &[f64] {
         let d = self.cloud().dimension();
