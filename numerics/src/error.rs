@@ -61,6 +61,18 @@ pub enum NumericsError {
     InvalidTile { tile: usize, requirement: &'static str },
     #[error("links[{link}] names a region that no tile has")]
     InvalidLink { link: usize },
+    #[error(
+        "the points do not enclose a volume: only {:.0} % of them have an inside on one side and an outside on the other",
+        100.0 * closedness
+    )]
+    OpenSurface {
+        /// Share of the points with two sides.
+        closedness: f64,
+    },
+    #[error(
+        "the surface needs more than {limit} nodes of a lattice with this step; make it longer, or set bounds"
+    )]
+    TooManyNodes { limit: usize },
     #[error("the computation was cancelled")]
     Cancelled,
 }

@@ -16,6 +16,8 @@ pub enum Purpose {
     /// Curvatures and operators of a surface, which are sensitive to the kernel's cusp at the points of the
     /// cloud.
     Curvatures,
+    /// Level sets of the signature function, which must have no sheets beside the surface.
+    LevelSets,
 }
 
 /// Default α for values, where none is given.
@@ -47,6 +49,10 @@ const NORMALS: SurfaceRule = SurfaceRule { extents: 0.45, spacings: 4.0, smoothi
 /// Smooth enough for second derivatives at the points, which are sensitive to the kernel's cusp.
 const CURVATURES: SurfaceRule = SurfaceRule { extents: 0.9, spacings: 8.0, smoothing: 3.0 };
 
+/// Short enough for a single sheet: on the bunny 5 to 11 spacings give one closed part, and spurious sheets
+/// begin at 15.
+const LEVEL_SETS: SurfaceRule = SurfaceRule { extents: 0.0, spacings: 5.0, smoothing: 0.4 };
+
 /// Returns the default kernel and α for a purpose: Matérn 5/2 for values, regularised Laplace for surfaces.
 /// `noise` is called for surfaces only. It returns the standard deviation of the points across the surface,
 /// unit L.
@@ -61,6 +67,7 @@ pub fn default_fit(scales: &Scales, purpose: Purpose, noise: impl FnOnce() -> f6
         }
         Purpose::Normals => NORMALS,
         Purpose::Curvatures => CURVATURES,
+        Purpose::LevelSets => LEVEL_SETS,
     };
     let length_scale = (rule.extents * scales.extent).max(rule.spacings * scales.spacing);
     let epsilon = (rule.smoothing * scales.spacing / length_scale).powi(2);

@@ -3,6 +3,7 @@
 pub mod degeneracy;
 pub mod geometry;
 pub mod local;
+pub mod mesh;
 pub mod operators;
 pub mod price;
 pub mod served;
@@ -87,9 +88,14 @@ impl Surface {
 
     /// Neighbour search among the points of the surface.
     pub fn neighbours(&self) -> &Neighbours {
+        self.sampling().neighbours()
+    }
+
+    /// Spacings of the points of the surface.
+    pub fn sampling(&self) -> &Sampling {
         match self {
-            Self::Signature(surface) => surface.sampling.neighbours(),
-            Self::Local(surface) => surface.sampling().neighbours(),
+            Self::Signature(surface) => &surface.sampling,
+            Self::Local(surface) => surface.sampling(),
         }
     }
 

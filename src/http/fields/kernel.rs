@@ -121,7 +121,9 @@ impl PlannedKernel {
                 let scales = scales.ok_or_else(Problem::internal)?;
                 let length_scale = match purpose {
                     Purpose::Values => family.length_scale_of_values(scales),
-                    Purpose::Normals | Purpose::Curvatures => family.default_length_scale(scales),
+                    Purpose::Normals | Purpose::Curvatures | Purpose::LevelSets => {
+                        family.default_length_scale(scales)
+                    }
                 };
                 NumericalKernel::new(family, length_scale, variance)
                     .map_err(|error| Problem::from_numerics(error, pointers))

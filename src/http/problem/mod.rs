@@ -264,6 +264,8 @@ impl Problem {
                 }
                 problem
             }
+            E::OpenSurface { .. } => at(Slug::InvalidRequest, "/open"),
+            E::TooManyNodes { .. } => at(Slug::InvalidRequest, "/step"),
             E::Unsupported { .. } => at(Slug::UnsupportedBySolver, "/solver"),
             E::Overflow { .. } => {
                 Self::new(Slug::InvalidRequest, format!("{detail}; scale the values or the length scale"))

@@ -28,6 +28,8 @@ mod tests;
 pub mod tiles;
 mod winding;
 
+pub(crate) use winding::numbers::WindingNumbers;
+
 use crate::error::NumericsError;
 use crate::machine::vector::{dot, unit};
 use crate::observer::Observer;

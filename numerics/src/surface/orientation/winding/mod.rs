@@ -4,4 +4,5 @@ mod areas;
 mod dipoles;
 pub(super) mod field;
 pub(super) mod gauss;
+pub(super) mod numbers;
 pub(super) mod turns;

@@ -1,0 +1,71 @@
+//! Smoothing of vertices along the surface.
+
+use rayon::prelude::*;
+
+use super::star::Triangulation;
+use crate::error::Result;
+use crate::machine::vector::{dot, norm};
+use crate::observer::Observer;
+use crate::surface::mesh::field::Field;
+
+/// Least cosine between the normals of a triangle before and after its vertex has moved.
+const TURN: f64 = 0.5;
+
+/// Places evaluated between two looks at whether the work is cancelled.
+const AT_ONCE: usize = 1 << 14;
+
+/// Moves each vertex to the mean of its neighbours along the surface, and back onto the surface.
+///
+/// # Errors
+/// Those of the field.
+pub fn smooth(mesh: &mut Triangulation, field: &dyn Field, observer: &dyn Observer) -> Result<()> {
+    let moving: Vec<u32> = (0..mesh.stars.len() as u32)
+        .filter(|&v| !mesh.is_fixed[v as usize] && !mesh.star(v).is_empty())
+        .collect();
+    let wanted: Vec<[f64; 3]> = moving.par_iter().map(|&vertex| tangential_mean(mesh, vertex)).collect();
+    for (vertices, places) in moving.chunks(AT_ONCE).zip(wanted.chunks(AT_ONCE)) {
+        observer.checkpoint()?;
+        let feet = field.feet(places.as_flattened(), observer)?.positions;
+        for (&vertex, foot) in vertices.iter().zip(feet.chunks_exact(3)) {
+            move_to(mesh, vertex, [foot[0], foot[1], foot[2]]);
+        }
+    }
+    Ok(())
+}
+
+/// The mean of the neighbours of a vertex, weighted by the area of their triangles, in its tangent plane.
+fn tangential_mean(mesh: &Triangulation, vertex: u32) -> [f64; 3] {
+    let own = mesh.position(vertex);
+    let (mut normal, mut sum, mut weights) = ([0.0; 3], [0.0; 3], 0.0);
+    for &at in mesh.star(vertex) {
+        let triangle = mesh.triangles[at as usize];
+        let area = mesh.normal_of(triangle);
+        let weight = norm(&area);
+        weights += weight;
+        for axis in 0..3 {
+            normal[axis] += area[axis];
+            let centre = triangle.iter().map(|&v| mesh.position(v)[axis]).sum::<f64>() / 3.0;
+            sum[axis] += weight * (centre - own[axis]);
+        }
+    }
+    let length = norm(&normal);
+    if weights == 0.0 || length == 0.0 {
+        return *own;
+    }
+    let step = sum.map(|s| s / weights);
+    let along = dot(&step, &normal) / (length * length);
+    [0, 1, 2].map(|axis| own[axis] + step[axis] - along * normal[axis])
+}
+
+/// Moves a vertex unless a triangle would turn over.
+fn move_to(mesh: &mut Triangulation, vertex: u32, to: [f64; 3]) {
+    let keeps = mesh.star(vertex).iter().map(|&at| mesh.triangles[at as usize]).all(|triangle| {
+        let before = mesh.normal_of(triangle);
+        let after =
+            Triangulation::area_vector(triangle.map(|v| if v == vertex { &to } else { mesh.position(v) }));
+        dot(&before, &after) >= TURN * norm(&before) * norm(&after) && norm(&after) > 0.0
+    });
+    if keeps {
+        mesh.positions[vertex as usize] = to;
+    }
+}

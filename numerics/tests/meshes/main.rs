@@ -1,0 +1,197 @@
+//! Meshes of level sets: topology, distances to known surfaces, shape of triangles, and refusals.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod support;
+
+use common::clouds::{circle, fibonacci_sphere, noisy, random_torus, square_grid};
+use common::fits::{default_kernel_and_alpha, factorize, fit, kernel, surface};
+use common::random::Random;
+use gramian_numerics::error::NumericsError;
+use gramian_numerics::kernel::Family;
+use gramian_numerics::kernel::defaults::Purpose;
+use gramian_numerics::observer::Unobserved;
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::surface::mesh::fields::interpolant::LevelOf;
+use gramian_numerics::surface::mesh::surface::{MeshOptions, mesh_of_level, mesh_of_surface};
+use gramian_numerics::surface::mesh::{Bounds, Quality, Support};
+use support::{OPTIONS, angles, assert_is_manifold, bunny, local, meshed, volume};
+
+/// Distance to the torus (2, ½) of the paper.
+fn off_torus(x: &[f64]) -> f64 {
+    let ring = x[0].hypot(x[1]) - 2.0;
+    (ring.hypot(x[2]) - 0.5).abs()
+}
+
+#[test]
+fn the_torus_of_gauss_is_a_torus() {
+    let cloud = random_torus(700, &mut Random(3));
+    let of_gauss = surface(&factorize(&cloud, kernel(Family::Gauss, 1.0), 1e-12));
+    for quality in [Quality::Raw, Quality::Regular] {
+        let (found, closedness) =
+            mesh_of_surface(&of_gauss, &MeshOptions { quality, ..OPTIONS }, &Unobserved).unwrap();
+        assert!(closedness.share > 0.9 && !closedness.is_turned, "{closedness:?}");
+        assert_eq!((found.quality, found.parts.len(), found.dropped.len()), (quality, 1, 0));
+        assert_eq!((found.parts[0].euler_characteristic, found.parts[0].n_boundary_edges), (0, 0));
+        assert_is_manifold(&found.mesh);
+        let worst = found.mesh.vertices.chunks_exact(3).map(off_torus).fold(0.0, f64::max);
+        assert!(worst < 1e-4, "{worst:e}");
+        assert!(found.residuals.iter().all(|residual| *residual < 1e-8));
+        // 2π²Rr², from below, because the triangles are chords.
+        let expected = 2.0 * std::f64::consts::PI.powi(2) * 2.0 * 0.25;
+        assert!((0.97..1.0).contains(&(volume(&found.mesh) / expected)), "{}", volume(&found.mesh));
+        if quality == Quality::Regular {
+            let angles = angles(&found.mesh);
+            let n_small = angles.iter().filter(|angle| **angle < 30.0).count();
+            assert!(angles[0] > 15.0 && n_small * 100 < angles.len(), "{} {n_small}", angles[0]);
+        }
+    }
+}
+
+#[test]
+fn normals_are_outward() {
+    let (found, _) = meshed(&local(fibonacci_sphere(800)), &OPTIONS);
+    for (x, normal) in found.mesh.vertices.chunks_exact(3).zip(found.normals.chunks_exact(3)) {
+        let along: f64 = x.iter().zip(normal).map(|(x, n)| x * n).sum();
+        assert!(along > 0.99, "{along}");
+        assert!((x.iter().map(|c| c * c).sum::<f64>().sqrt() - 1.0).abs() < 1e-3);
+    }
+    assert!(found.support.iter().all(|support| *support == Support::Observed));
+}
+
+#[test]
+fn two_bodies_are_two_parts() {
+    let one = fibonacci_sphere(500);
+    let moved = |by: f64| one.points().flat_map(move |x| [x[0] + by, x[1], x[2]]).collect::<Vec<f64>>();
+    let cloud = Cloud::new([moved(0.0), moved(2.6)].concat(), 3).unwrap();
+    let (found, _) = meshed(&local(cloud), &OPTIONS);
+    assert_eq!(found.parts.iter().map(|part| part.euler_characteristic).collect::<Vec<_>>(), [2, 2]);
+}
+
+#[test]
+fn a_curve_is_a_closed_polyline() {
+    let (found, _) = meshed(&local(circle(60)), &OPTIONS);
+    assert_eq!((found.parts.len(), found.parts[0].euler_characteristic), (1, 0));
+    assert!((found.parts[0].area / std::f64::consts::TAU - 1.0).abs() < 0.01, "{:?}", found.parts);
+    for segment in found.mesh.cells() {
+        let [a, b] = [found.mesh.vertex(segment[0]), found.mesh.vertex(segment[1])];
+        assert!(a[0] * b[1] - a[1] * b[0] > 0.0, "segments run counter-clockwise around the inside");
+    }
+}
+
+#[test]
+fn the_bunny_is_one_closed_part() {
+    let (cloud, spacing) = bunny();
+    let (kernel, alpha) = default_kernel_and_alpha(&cloud, Purpose::LevelSets);
+    {
+        let (found, closedness) = meshed(&surface(&factorize(&cloud, kernel, alpha)), &OPTIONS);
+        assert_eq!((found.parts.len(), found.parts[0].euler_characteristic), (1, 2), "{:?}", found.parts);
+        assert!(closedness.share > 0.9, "{closedness:?}");
+        assert_is_manifold(&found.mesh);
+        // The cloud is a sample of the mesh: its points are within a spacing of the surface.
+        let mean = found.residuals.iter().sum::<f64>() / found.residuals.len() as f64;
+        assert!(mean < 0.01 * spacing, "{mean}");
+    }
+}
+
+#[test]
+fn noise_does_not_tear_the_surface() {
+    let cloud = noisy(&fibonacci_sphere(2000), 0.02, &mut Random(5));
+    let (found, _) = meshed(&local(cloud), &OPTIONS);
+    assert_eq!(found.parts.iter().map(|part| part.euler_characteristic).collect::<Vec<_>>(), [2]);
+}
+
+#[test]
+fn a_hole_is_bridged_and_said() {
+    let whole = fibonacci_sphere(2000);
+    let points: Vec<f64> = whole.points().filter(|x| x[2] < 0.95).flatten().copied().collect();
+    let (found, _) = meshed(&local(Cloud::new(points, 3).unwrap()), &OPTIONS);
+    assert_eq!((found.parts[0].euler_characteristic, found.parts[0].n_boundary_edges), (2, 0));
+    let bridged = found.support.iter().zip(found.mesh.vertices.chunks_exact(3));
+    let mut n_bridged = 0;
+    for (_, x) in bridged.filter(|(support, _)| **support == Support::Bridged) {
+        assert!(x[2] > 0.9, "{x:?}");
+        n_bridged += 1;
+    }
+    assert!(n_bridged > 10, "{n_bridged}");
+}
+
+#[test]
+fn an_open_sheet_is_refused_unless_it_may_be_open() {
+    let sheet: Vec<f64> = square_grid(30).points().flat_map(|x| [x[0], x[1], 0.1 * x[0] * x[0]]).collect();
+    let sheet = local(Cloud::new(sheet, 3).unwrap());
+    let refused = mesh_of_surface(&sheet, &OPTIONS, &Unobserved).map(|_| ());
+    assert!(matches!(refused, Err(NumericsError::OpenSurface { .. })), "{refused:?}");
+    let (found, _) = meshed(&sheet, &MeshOptions { is_open: true, ..OPTIONS });
+    assert_eq!((found.parts.len(), found.parts[0].euler_characteristic), (1, 1), "{:?}", found.parts);
+    assert!(found.parts[0].n_boundary_edges > 20);
+}
+
+#[test]
+fn a_level_of_values_ends_at_the_bounds() {
+    // u = x over a grid: its level ½ is the line x = ½.
+    let cloud = square_grid(24);
+    let values: Vec<f64> = cloud.points().map(|x| x[0]).collect();
+    let function = fit(&factorize(&cloud, kernel(Family::Matern { order: 2 }, 1.0), 1e-10), &values);
+    let bounds = Some(Bounds { min: vec![0.0, 0.0], max: vec![1.0, 1.0] });
+    let options = MeshOptions { bounds, ..OPTIONS };
+    let found = mesh_of_level(LevelOf::new(&function, 0.5, 1.0), &options, &Unobserved).unwrap();
+    assert_eq!(
+        (found.parts.len(), found.parts[0].euler_characteristic, found.parts[0].n_boundary_edges),
+        (1, 1, 2)
+    );
+    assert!(found.mesh.vertices.chunks_exact(2).all(|x| (x[0] - 0.5).abs() < 1e-3));
+    // Outward is where u falls.
+    assert!(found.normals.chunks_exact(2).all(|normal| normal[0] < -0.99));
+}
+
+#[test]
+#[expect(clippy::disallowed_methods, reason = "a test may wait for another pool")]
+fn the_mesh_does_not_depend_on_the_number_of_threads() {
+    let sphere = local(fibonacci_sphere(400));
+    let mesh_on = |n_threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
+        pool.install(|| meshed(&sphere, &OPTIONS).0)
+    };
+    let one = mesh_on(1);
+    for n_threads in [2, 16] {
+        let other = mesh_on(n_threads);
+        assert_eq!(one.mesh, other.mesh);
+        assert_eq!((&one.normals, &one.residuals), (&other.normals, &other.residuals));
+    }
+}
+
+#[test]
+fn a_step_too_short_is_refused() {
+    let options = MeshOptions { step: Some(1e-4), max_nodes: 100_000, ..OPTIONS };
+    let refused = mesh_of_surface(&local(fibonacci_sphere(300)), &options, &Unobserved).map(|_| ());
+    assert_eq!(refused, Err(NumericsError::TooManyNodes { limit: 100_000 }));
+}
+
+#[test]
+fn units_and_offsets_change_nothing() {
+    let own = fibonacci_sphere(400);
+    let moved = |scale: f64, offset: f64| {
+        Cloud::new(own.coordinates().iter().map(|x| scale * x + offset).collect(), 3).unwrap()
+    };
+    let counts = |cloud: Cloud| {
+        let (found, _) = meshed(&local(cloud), &OPTIONS);
+        (found.parts.len(), found.parts[0].euler_characteristic, found.parts[0].n_boundary_edges)
+    };
+    for (scale, offset) in [(1e-6, 0.0), (1e6, 0.0), (1.0, 1e5)] {
+        assert_eq!(counts(moved(scale, offset)), (1, 2, 0), "{scale} {offset}");
+    }
+}
+
+#[test]
+fn cancellation_is_honoured() {
+    struct Gone;
+    impl gramian_numerics::observer::Observer for Gone {
+        fn enter(&self, _: gramian_numerics::observer::Stage) {}
+        fn is_cancelled(&self) -> bool {
+            true
+        }
+    }
+    let sphere = local(fibonacci_sphere(300));
+    assert_eq!(mesh_of_surface(&sphere, &OPTIONS, &Gone).map(|_| ()), Err(NumericsError::Cancelled));
+}
