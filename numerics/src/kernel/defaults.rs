@@ -49,8 +49,8 @@ const NORMALS: SurfaceRule = SurfaceRule { extents: 0.45, spacings: 4.0, smoothi
 /// Smooth enough for second derivatives at the points, which are sensitive to the kernel's cusp.
 const CURVATURES: SurfaceRule = SurfaceRule { extents: 0.9, spacings: 8.0, smoothing: 3.0 };
 
-/// Short enough for a single sheet: on the bunny 5 to 11 spacings give one closed part, and spurious sheets
-/// begin at 15.
+/// Short enough for a single sheet: it makes the bunny one closed part (`tests/meshes`). In a prototype
+/// spurious sheets began at 15 spacings.
 const LEVEL_SETS: SurfaceRule = SurfaceRule { extents: 0.0, spacings: 5.0, smoothing: 0.4 };
 
 /// Returns the default kernel and α for a purpose: Matérn 5/2 for values, regularised Laplace for surfaces.

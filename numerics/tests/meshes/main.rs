@@ -83,15 +83,13 @@ fn a_curve_is_a_closed_polyline() {
 fn the_bunny_is_one_closed_part() {
     let (cloud, spacing) = bunny();
     let (kernel, alpha) = default_kernel_and_alpha(&cloud, Purpose::LevelSets);
-    {
-        let (found, closedness) = meshed(&surface(&factorize(&cloud, kernel, alpha)), &OPTIONS);
-        assert_eq!((found.parts.len(), found.parts[0].euler_characteristic), (1, 2), "{:?}", found.parts);
-        assert!(closedness.share > 0.9, "{closedness:?}");
-        assert_is_manifold(&found.mesh);
-        // The cloud is a sample of the mesh: its points are within a spacing of the surface.
-        let mean = found.residuals.iter().sum::<f64>() / found.residuals.len() as f64;
-        assert!(mean < 0.01 * spacing, "{mean}");
-    }
+    let (found, closedness) = meshed(&surface(&factorize(&cloud, kernel, alpha)), &OPTIONS);
+    assert_eq!((found.parts.len(), found.parts[0].euler_characteristic), (1, 2), "{:?}", found.parts);
+    assert!(closedness.share > 0.9, "{closedness:?}");
+    assert_is_manifold(&found.mesh);
+    // Vertices lie on the level.
+    let mean = found.residuals.iter().sum::<f64>() / found.residuals.len() as f64;
+    assert!(mean < 0.01 * spacing, "{mean}");
 }
 
 #[test]
@@ -163,9 +161,13 @@ fn the_mesh_does_not_depend_on_the_number_of_threads() {
 
 #[test]
 fn a_step_too_short_is_refused() {
-    let options = MeshOptions { step: Some(1e-4), max_nodes: 100_000, ..OPTIONS };
-    let refused = mesh_of_surface(&local(fibonacci_sphere(300)), &options, &Unobserved).map(|_| ());
-    assert_eq!(refused, Err(NumericsError::TooManyNodes { limit: 100_000 }));
+    let sphere = local(fibonacci_sphere(300));
+    // From too many nodes to coordinates beyond an i64.
+    for step in [1e-4, 1e-7, 1e-140] {
+        let options = MeshOptions { step: Some(step), max_nodes: 100_000, ..OPTIONS };
+        let refused = mesh_of_surface(&sphere, &options, &Unobserved).map(|_| ());
+        assert_eq!(refused, Err(NumericsError::TooManyNodes { limit: 100_000 }), "{step}");
+    }
 }
 
 #[test]

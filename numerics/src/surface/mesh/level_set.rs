@@ -117,11 +117,12 @@ fn raw_mesh(request: &LevelSetRequest<'_>, observer: &dyn Observer) -> Result<Me
     let lattice = Lattice::new(&centre, request.step);
     let feet = field.feet(request.cloud.coordinates(), observer)?.positions;
     let on_surface = feet.chunks_exact(field.dimension()).filter(|x| request.bounds.contains(x));
-    let seeds = on_surface.filter_map(|x| lattice.cell(x)).collect();
+    // A step so short that the lattice does not reach a point is refused like one with too many nodes.
+    let too_short = NumericsError::TooManyNodes { limit: request.max_nodes };
+    let seeds = on_surface.map(|x| lattice.cell(x)).collect::<Option<Vec<_>>>().ok_or(too_short)?;
     let rim = request.is_open.then_some(request.sampling);
     let region = Region { lattice: &lattice, bounds: &request.bounds, rim };
-    let followed = follow(field, &region, seeds, request.max_nodes, observer)?
-        .map_err(|_| NumericsError::TooManyNodes { limit: request.max_nodes })?;
+    let followed = follow(field, &region, seeds, request.max_nodes, observer)?;
     let edges = crossed_edges(&followed, &lattice);
     let vertices = roots(field, &lattice, &followed, &edges, observer)?;
     let cells = cut(&followed, &lattice, &edges);

@@ -7,14 +7,11 @@ use super::level_set::{LevelSet, LevelSetRequest, Quality, level_set};
 use super::{Bounds, field::Field};
 use crate::error::{NumericsError, Result};
 use crate::function::interpolant::Interpolant;
-use crate::machine::small::zeros;
-use crate::machine::vector::norm;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::points::sampling::Sampling;
-use crate::sums::jets::{JetOrder, Jets};
+use crate::sums::jets::JetOrder;
 use crate::surface::Surface;
-use crate::surface::curvature::principal_curvatures;
 use crate::surface::orientation::WindingNumbers;
 
 /// Part of the radius of a cloud, and spacings, by which the default box exceeds that of its points.
@@ -75,24 +72,6 @@ pub fn mesh_of_level(field: LevelOf<'_>, options: &MeshOptions, observer: &dyn O
     let cloud = field.cloud();
     let sampling = Sampling::of(cloud, observer)?;
     level_set(&request(&field, cloud, &sampling, options), observer)
-}
-
-/// Computes the principal curvatures `[k, d−1]` and the mean curvatures `[k]` of level surfaces, 1/L, from
-/// jets with Hessians. Outward is where u falls. They are 0 where u has no gradient.
-pub fn curvatures_of_level(jets: &Jets) -> (Vec<f64>, Vec<f64>) {
-    let d = jets.dimension();
-    let (mut principal, mut mean) = (Vec::new(), Vec::new());
-    for vertex in 0..jets.n_queries() {
-        let (gradient, hessian) = (jets.gradient(vertex), jets.hessian(vertex));
-        let of_vertex = if norm(gradient) > 0.0 {
-            principal_curvatures(gradient, &hessian, -1.0).0
-        } else {
-            zeros(d - 1)
-        };
-        mean.push(of_vertex.iter().sum::<f64>() / (d - 1) as f64);
-        principal.extend(of_vertex);
-    }
-    (principal, mean)
 }
 
 /// The level of the surface: the mean of u over the points, which is 1 for α = 0 (errata.md, 13).

@@ -9,7 +9,7 @@
 //! ```
 //!
 //! ρ is 1 where the normals of the nearest points agree, and x and its foot are near to the points. It falls
-//! to 0 where they are not. At the surface of a cloud without gaps ρ is 0.97 to 1, so w decides only off it.
+//! to 0 where they are not. At the surface of a cloud without gaps ρ is near 1, so w decides only off it.
 //! Neighbours change from place to place, so f has small jumps.
 
 use rayon::prelude::*;

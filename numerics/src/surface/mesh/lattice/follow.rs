@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::nodes::{Lattice, Node};
-use crate::error::Result;
+use crate::error::{NumericsError, Result};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::points::sampling::Sampling;
@@ -72,10 +72,6 @@ impl Bounds {
     }
 }
 
-/// More nodes than there may be: the surface is too large for its step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct TooManyNodes;
-
 impl Samples {
     pub fn n_nodes(&self) -> usize {
         self.nodes.len()
@@ -124,14 +120,14 @@ impl Samples {
 /// far as it is connected, and parts of it that no seed is on are not found.
 ///
 /// # Errors
-/// Those of the field. The inner error if there are too many nodes.
+/// Those of the field. `NumericsError::TooManyNodes`.
 pub fn follow(
     field: &dyn Field,
     region: &Region<'_>,
     seeds: Vec<Node>,
     max_nodes: usize,
     observer: &dyn Observer,
-) -> Result<std::result::Result<Followed, TooManyNodes>> {
+) -> Result<Followed> {
     let lattice = region.lattice;
     let n_corners = 1 << lattice.dimension();
     let mut samples = Samples::default();
@@ -141,7 +137,7 @@ pub fn follow(
         let corners = front.par_iter().flat_map_iter(|cell| (0..n_corners).map(|corner| cell.corner(corner)));
         let new = sorted(corners.filter(|node| !samples.contains(*node)).collect());
         if samples.n_nodes() + new.len() > max_nodes {
-            return Ok(Err(TooManyNodes));
+            return Err(NumericsError::TooManyNodes { limit: max_nodes });
         }
         let values = evaluate(field, lattice, &new, observer)?;
         samples.merge(&new, &values);
@@ -158,7 +154,7 @@ pub fn follow(
         front = sorted(next.filter(is_new).collect());
     }
     cells.par_sort_unstable();
-    Ok(Ok(Followed { samples, cells }))
+    Ok(Followed { samples, cells })
 }
 
 fn evaluate(

@@ -121,8 +121,10 @@ impl Lattice {
             }
             _ => Small::from_slice(&[row(1) + row(2), row(0) + row(2), row(0) + row(1)]),
         };
+        // Compared as floats: a short step takes them beyond i64. NaN is not in the range either.
+        let is_held = |u: &f64| u.floor().abs() <= MAX_COORDINATE as f64;
         let floors: SmallVec<[i64; 4]> = u.iter().map(|u| u.floor() as i64).collect();
-        floors.iter().all(|u| u.abs() <= MAX_COORDINATE).then(|| Node::of(&floors))
+        u.iter().all(is_held).then(|| Node::of(&floors))
     }
 
     /// Whether the coordinates of a cell leave room for its neighbours.
