@@ -62,7 +62,8 @@ pub enum NumericsError {
     #[error("links[{link}] names a region that no tile has")]
     InvalidLink { link: usize },
     #[error(
-        "the points do not enclose a volume: only {:.0} % of them have an inside on one side and an outside on the other",
+        "the points do not enclose a volume: only {:.0} % of them have an inside and an outside; let the surface be open \
+         if it ends with its points, or give them normals outward",
         100.0 * closedness
     )]
     OpenSurface {

@@ -12,10 +12,23 @@ use gramian_numerics::kernel::Family;
 use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, Orientation, SurfaceModel};
 use gramian_numerics::surface::mesh::fields::interpolant::LevelOf;
 use gramian_numerics::surface::mesh::surface::{MeshOptions, mesh_of_level, mesh_of_surface};
 use gramian_numerics::surface::mesh::{Bounds, Quality, Support};
-use support::{OPTIONS, angles, assert_is_manifold, bunny, local, meshed, volume};
+use support::{OPTIONS, angles, assert_is_manifold, bunny, local, meshed, spacing_of, volume};
+
+const WITH_DEVIATIONS: GeometryRequest = GeometryRequest {
+    orientation: Orientation::Outward,
+    model: SurfaceModel::Auto,
+    checks_curvatures: false,
+    max_offsets: 0,
+    has_deviations: true,
+};
+
+fn norm(x: &[f64]) -> f64 {
+    x.iter().map(|c| c * c).sum::<f64>().sqrt()
+}
 
 /// Distance to the torus (2, ½) of the paper.
 fn off_torus(x: &[f64]) -> f64 {
@@ -66,6 +79,71 @@ fn two_bodies_are_two_parts() {
     let cloud = Cloud::new([moved(0.0), moved(2.6)].concat(), 3).unwrap();
     let (found, _) = meshed(&local(cloud), &OPTIONS);
     assert_eq!(found.parts.iter().map(|part| part.euler_characteristic).collect::<Vec<_>>(), [2, 2]);
+}
+
+#[test]
+fn linked_tori_are_two_parts_with_a_hole_each() {
+    let one = random_torus(1500, &mut Random(11));
+    let linked = one.points().flat_map(|x| [x[0] + 2.0, x[2], x[1]]);
+    let points: Vec<f64> = one.coordinates().iter().copied().chain(linked).collect();
+    let (found, _) = meshed(&local(Cloud::new(points, 3).unwrap()), &OPTIONS);
+    assert_eq!(found.parts.iter().map(|part| part.euler_characteristic).collect::<Vec<_>>(), [0, 0]);
+    assert_is_manifold(&found.mesh);
+}
+
+/// Share of the vertices of a noisy cloud's mesh whose distance `off` from the truth is within 1.96 of their
+/// deviations.
+fn share_within(cloud: &Cloud, noise: f64, off: impl Fn(&[f64]) -> f64) -> f64 {
+    let surface = local(noisy(cloud, noise, &mut Random(13)));
+    let (found, _) = meshed(&surface, &OPTIONS);
+    assert_eq!(found.parts.iter().map(|part| part.euler_characteristic).collect::<Vec<_>>(), [2]);
+    let vertices = Cloud::new(found.mesh.vertices.clone(), 3).unwrap();
+    let geometry = Geometry::of(&surface, &vertices, &WITH_DEVIATIONS, &Unobserved).unwrap();
+    let known = geometry.deviations().unwrap();
+    let rows = vertices.points().zip(&known.height).zip(&known.is_known);
+    let within: Vec<bool> = rows
+        .filter(|(_, is_known)| **is_known)
+        .map(|((x, deviation), _)| off(x) <= 1.96 * deviation)
+        .collect();
+    within.iter().filter(|is_within| **is_within).count() as f64 / within.len() as f64
+}
+
+#[test]
+fn vertices_are_as_near_to_the_truth_as_their_deviations_say() {
+    let off_sphere = |x: &[f64]| (norm(x) - 1.0).abs();
+    // To first order: |F|/|∇F| of F = x² + 4y² + 4z² − 4.
+    let off_ellipsoid = |x: &[f64]| {
+        let value = x[0] * x[0] + 4.0 * (x[1] * x[1] + x[2] * x[2]) - 4.0;
+        value.abs() / norm(&[2.0 * x[0], 8.0 * x[1], 8.0 * x[2]])
+    };
+    let sphere = fibonacci_sphere(2000);
+    let ellipsoid = Cloud::new(sphere.points().flat_map(|x| [2.0 * x[0], x[1], x[2]]).collect(), 3).unwrap();
+    for spacings in [0.5, 1.0] {
+        let of_sphere = share_within(&sphere, spacings * spacing_of(&sphere), off_sphere);
+        let of_ellipsoid = share_within(&ellipsoid, spacings * spacing_of(&ellipsoid), off_ellipsoid);
+        for share in [of_sphere, of_ellipsoid] {
+            assert!((0.9..=0.995).contains(&share), "noise of {spacings} spacings: {share}");
+        }
+    }
+}
+
+#[test]
+fn a_level_is_found_wherever_it_separates_points() {
+    // Two bumps in a cube of points: the level ½ is a closed surface around each.
+    let bump = |x: &[f64], at: f64| (-12.0 * ((x[0] - at).powi(2) + x[1] * x[1] + x[2] * x[2])).exp();
+    let axis = |k: usize| -1.5 + 0.2 * k as f64;
+    let points: Vec<f64> =
+        (0..16 * 8 * 8).flat_map(|i| [axis(i % 16), axis(i / 16 % 8) + 0.8, axis(i / 128) + 0.8]).collect();
+    let cloud = Cloud::new(points, 3).unwrap();
+    let values: Vec<f64> = cloud.points().map(|x| bump(x, -0.8) + bump(x, 0.8)).collect();
+    let function = fit(&factorize(&cloud, kernel(Family::Gauss, 0.5), 1e-10), &values);
+    let found = mesh_of_level(LevelOf::new(&function, 0.5, 1.0), &OPTIONS, &Unobserved).unwrap();
+    assert_eq!(found.parts.iter().map(|part| part.euler_characteristic).collect::<Vec<_>>(), [2, 2]);
+    let radius = (2.0_f64.ln() / 12.0).sqrt();
+    for x in found.mesh.vertices.chunks_exact(3) {
+        let centre = 0.8 * x[0].signum();
+        assert!((norm(&[x[0] - centre, x[1], x[2]]) - radius).abs() < 0.02, "{x:?}");
+    }
 }
 
 #[test]

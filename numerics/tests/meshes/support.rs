@@ -31,8 +31,13 @@ pub fn bunny() -> (Arc<Cloud>, f64) {
     let text = std::fs::read_to_string(path).unwrap();
     let points = text.split_whitespace().map(|number| number.parse().unwrap()).collect();
     let cloud = Cloud::new(points, 3).unwrap();
-    let spacing = Sampling::of(&cloud, &Unobserved).unwrap().scales().spacing;
+    let spacing = spacing_of(&cloud);
     (Arc::new(cloud), spacing)
+}
+
+/// The median spacing of points.
+pub fn spacing_of(cloud: &Cloud) -> f64 {
+    Sampling::of(cloud, &Unobserved).unwrap().scales().spacing
 }
 
 /// All angles of the triangles in degrees, ascending.

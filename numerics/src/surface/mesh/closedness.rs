@@ -15,8 +15,8 @@ const OFF: f64 = 2.0;
 /// Largest distance of a winding number from 0 outside, and from 1 inside.
 const NEAR: f64 = 0.3;
 
-/// Largest factor by which areas are corrected.
-const MAX_FACTOR: f64 = 2.0;
+/// Least and largest jump of winding numbers by which areas are corrected. Noise makes areas too large.
+const JUMPS: [f64; 2] = [0.5, 8.0];
 
 /// Points that are looked at, or fewer than twice as many.
 const N_LOOKED_AT: usize = 2000;
@@ -68,7 +68,7 @@ impl Closedness {
         };
         let mut found: Vec<[f64; 2]> = points.par_iter().map(sides).collect::<Result<_>>()?;
         let jumps = found.iter().map(|[out, into]| (into - out).abs()).collect();
-        let jump = median(jumps).unwrap_or(1.0).clamp(1.0 / MAX_FACTOR, MAX_FACTOR);
+        let jump = median(jumps).unwrap_or(1.0).clamp(JUMPS[0], JUMPS[1]);
         found.iter_mut().flatten().for_each(|w| *w /= jump);
         let is_near = |w: f64, expected: f64| (w - expected).abs() < NEAR;
         let count = |outside: f64, inside: f64| {

@@ -11,7 +11,6 @@ use super::regular::regular;
 use super::support::{Support, support};
 use crate::error::{NumericsError, Result};
 use crate::observer::{Observer, Stage};
-use crate::points::cloud::Cloud;
 use crate::points::sampling::Sampling;
 
 /// Shape of the triangles.
@@ -26,9 +25,10 @@ pub enum Quality {
 /// A level set to mesh.
 pub struct LevelSetRequest<'a> {
     pub field: &'a dyn Field,
-    /// Points from which the surface is followed, and that it is supported by.
-    pub cloud: &'a Cloud,
+    /// The points that support the surface.
     pub sampling: &'a Sampling,
+    /// Places from which the surface is followed, `[s, d]`.
+    pub seeds: Vec<f64>,
     /// Longest edge of the lattice, L.
     pub step: f64,
     /// Box that the surface is followed in.
@@ -73,7 +73,7 @@ pub fn level_set(request: &LevelSetRequest<'_>, observer: &dyn Observer) -> Resu
         }
         quality => (raw, quality),
     };
-    let (mesh, feet) = settled(mesh, field, observer)?;
+    let (mesh, feet) = settled(mesh, field, SETTLED * request.step, observer)?;
     let parts = Parts::of(&mesh).parts;
     let support = support(&mesh, request.sampling);
     Ok(LevelSet { normals: feet.normals, residuals: feet.distances, support, parts, dropped, quality, mesh })
@@ -82,13 +82,16 @@ pub fn level_set(request: &LevelSetRequest<'_>, observer: &dyn Observer) -> Resu
 /// Newton steps after which vertices stay where they are: from the end of smoothing, two suffice.
 const MAX_STEPS: usize = 6;
 
-/// Moves the vertices onto the surface, as near as the field knows it.
-fn settled(mut mesh: Mesh, field: &dyn Field, observer: &dyn Observer) -> Result<(Mesh, Feet)> {
+/// Part of a step up to which a vertex counts as on the surface.
+const SETTLED: f64 = 1e-10;
+
+/// Moves the vertices onto the surface, until all are as near as `enough`, L, or come no nearer.
+fn settled(mut mesh: Mesh, field: &dyn Field, enough: f64, observer: &dyn Observer) -> Result<(Mesh, Feet)> {
     let mut feet = field.feet(&mesh.vertices, observer)?;
     let d = mesh.dimension;
     for _ in 0..MAX_STEPS {
         let worst = feet.distances.iter().copied().fold(0.0, f64::max);
-        if worst <= field.tolerance() {
+        if worst <= enough {
             break;
         }
         let next = field.feet(&feet.positions, observer)?;
@@ -115,11 +118,10 @@ fn raw_mesh(request: &LevelSetRequest<'_>, observer: &dyn Observer) -> Result<Me
     let (field, Bounds { min, max }) = (request.field, &request.bounds);
     let centre: Vec<f64> = min.iter().zip(max).map(|(a, b)| 0.5 * (a + b)).collect();
     let lattice = Lattice::new(&centre, request.step);
-    let feet = field.feet(request.cloud.coordinates(), observer)?.positions;
-    let on_surface = feet.chunks_exact(field.dimension()).filter(|x| request.bounds.contains(x));
+    let seeds = request.seeds.chunks_exact(field.dimension()).filter(|x| request.bounds.contains(x));
     // A step so short that the lattice does not reach a point is refused like one with too many nodes.
     let too_short = NumericsError::TooManyNodes { limit: request.max_nodes };
-    let seeds = on_surface.map(|x| lattice.cell(x)).collect::<Option<Vec<_>>>().ok_or(too_short)?;
+    let seeds = seeds.map(|x| lattice.cell(x)).collect::<Option<Vec<_>>>().ok_or(too_short)?;
     let rim = request.is_open.then_some(request.sampling);
     let region = Region { lattice: &lattice, bounds: &request.bounds, rim };
     let followed = follow(field, &region, seeds, request.max_nodes, observer)?;

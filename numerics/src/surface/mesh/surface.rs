@@ -1,17 +1,24 @@
 //! Meshes of the surface that a cloud samples, by its signature function or by local regressions.
 
+use rayon::prelude::*;
+
 use super::closedness::{Closedness, OPEN};
 use super::fields::interpolant::LevelOf;
 use super::fields::local::LocalField;
+use super::lattice::follow::is_inside;
 use super::level_set::{LevelSet, LevelSetRequest, Quality, level_set};
 use super::{Bounds, field::Field};
 use crate::error::{NumericsError, Result};
 use crate::function::interpolant::Interpolant;
+use crate::machine::small::zeros;
+use crate::machine::vector::norm;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
+use crate::points::neighbours::Neighbour;
 use crate::points::sampling::Sampling;
-use crate::sums::jets::JetOrder;
+use crate::sums::jets::{JetOrder, Jets};
 use crate::surface::Surface;
+use crate::surface::curvature::principal_curvatures;
 use crate::surface::orientation::WindingNumbers;
 
 /// Part of the radius of a cloud, and spacings, by which the default box exceeds that of its points.
@@ -47,7 +54,9 @@ pub fn mesh_of_surface(
         if closedness.share < OPEN && !options.is_open {
             return Err(NumericsError::OpenSurface { closedness: closedness.share });
         }
-        Ok((level_set(&request(field, cloud, sampling, options), observer)?, closedness))
+        let mut request = request(field, cloud, sampling, options);
+        request.seeds = field.feet(cloud.coordinates(), observer)?.positions;
+        Ok((level_set(&request, observer)?, closedness))
     };
     match surface {
         Surface::Local(local) => {
@@ -66,12 +75,65 @@ pub fn mesh_of_surface(
 
 /// Meshes a level of a function, where its points are.
 ///
+/// It is followed from the feet of the points, and from between points on different sides of it. So every
+/// part that separates points is found.
+///
 /// # Errors
 /// Those of [`level_set`].
 pub fn mesh_of_level(field: LevelOf<'_>, options: &MeshOptions, observer: &dyn Observer) -> Result<LevelSet> {
     let cloud = field.cloud();
     let sampling = Sampling::of(cloud, observer)?;
-    level_set(&request(&field, cloud, &sampling, options), observer)
+    let mut request = request(&field, cloud, &sampling, options);
+    let values = field.values(cloud.coordinates(), observer)?;
+    request.seeds = field.feet(cloud.coordinates(), observer)?.positions;
+    request.seeds.extend(places_between(cloud, &request, &values));
+    level_set(&request, observer)
+}
+
+/// Nearest points of a point that the level may separate it from.
+const N_NEAREST: usize = 9;
+
+/// Most places between two points.
+const MAX_BETWEEN: f64 = 32.0;
+
+/// Places half a step apart on the way from each point inside to those outside among its nearest.
+fn places_between(cloud: &Cloud, request: &LevelSetRequest<'_>, values: &[f64]) -> Vec<f64> {
+    let LevelSetRequest { sampling, step, .. } = *request;
+    let from_point = |found: &mut Vec<Neighbour>, point: usize| {
+        let x = cloud.point(point);
+        sampling.neighbours().nearest_positions_into(x, N_NEAREST, found);
+        let mut places = Vec::new();
+        for near in found.iter().filter(|near| !is_inside(values[near.point])) {
+            let n_parts = (near.squared_distance.sqrt() / (0.5 * step)).ceil().clamp(1.0, MAX_BETWEEN);
+            for part in 0..=n_parts as usize {
+                let t = part as f64 / n_parts;
+                places.extend(x.iter().zip(cloud.point(near.point)).map(|(x, y)| x + t * (y - x)));
+            }
+        }
+        places
+    };
+    let inside = (0..cloud.n_points()).into_par_iter().filter(|&point| is_inside(values[point]));
+    inside.map_init(Vec::new, from_point).flatten_iter().collect()
+}
+
+/// Computes the principal curvatures `[k, d−1]` and the mean curvatures `[k]` of level surfaces, 1/L,
+/// from jets with Hessians. They are 0 where u has no gradient.
+///
+/// `sign` is −1 for normals along which u falls, as those of a mesh, and +1 for the gradient's direction.
+pub fn curvatures_of_level(jets: &Jets, sign: f64) -> (Vec<f64>, Vec<f64>) {
+    let d = jets.dimension();
+    let (mut principal, mut mean) = (Vec::new(), Vec::new());
+    for vertex in 0..jets.n_queries() {
+        let (gradient, hessian) = (jets.gradient(vertex), jets.hessian(vertex));
+        let of_vertex = if norm(gradient) > 0.0 {
+            principal_curvatures(gradient, &hessian, sign).0
+        } else {
+            zeros(d - 1)
+        };
+        mean.push(of_vertex.iter().sum::<f64>() / (d - 1) as f64);
+        principal.extend(of_vertex);
+    }
+    (principal, mean)
 }
 
 /// The level of the surface: the mean of u over the points, which is 1 for α = 0 (errata.md, 13).
@@ -92,8 +154,8 @@ fn request<'a>(
     let margin = MARGIN_OF_RADIUS * cloud.radius() + MARGIN_OF_SPACING * step.max(spacing);
     LevelSetRequest {
         field,
-        cloud,
         sampling,
+        seeds: Vec::new(),
         step,
         bounds: options.bounds.clone().unwrap_or_else(|| Bounds::around(cloud, margin)),
         is_open: options.is_open,

@@ -37,19 +37,13 @@ impl Field for LevelOf<'_> {
         self.function.solver.cloud().dimension()
     }
 
-    fn values(&self, places: &[f64], observer: &dyn Observer) -> Result<Vec<f64>> {
-        if places.is_empty() {
-            return Ok(Vec::new());
-        }
+    fn values_at_once(&self, places: &[f64], observer: &dyn Observer) -> Result<Vec<f64>> {
         let queries = Cloud::new(places.to_vec(), self.dimension())?;
         let jets = self.function.at(&queries, JetOrder::Value, observer)?;
         Ok(jets.values().iter().map(|u| u - self.level).collect())
     }
 
-    fn feet(&self, places: &[f64], observer: &dyn Observer) -> Result<Feet> {
-        if places.is_empty() {
-            return Ok(Feet::default());
-        }
+    fn feet_at_once(&self, places: &[f64], observer: &dyn Observer) -> Result<Feet> {
         let d = self.dimension();
         let queries = Cloud::new(places.to_vec(), d)?;
         let jets = self.function.at(&queries, JetOrder::Gradient, observer)?;

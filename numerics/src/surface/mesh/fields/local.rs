@@ -205,14 +205,12 @@ impl Field for LocalField<'_> {
         self.cloud.dimension()
     }
 
-    fn values(&self, places: &[f64], observer: &dyn Observer) -> Result<Vec<f64>> {
-        observer.checkpoint()?;
+    fn values_at_once(&self, places: &[f64], _observer: &dyn Observer) -> Result<Vec<f64>> {
         let rows = places.par_chunks_exact(self.dimension());
         Ok(rows.map_init(Vec::new, |found, x| self.value(x, &self.blend(x, found))).collect())
     }
 
-    fn feet(&self, places: &[f64], observer: &dyn Observer) -> Result<Feet> {
-        observer.checkpoint()?;
+    fn feet_at_once(&self, places: &[f64], _observer: &dyn Observer) -> Result<Feet> {
         let d = self.dimension();
         let rows = places.par_chunks_exact(d);
         let jets: Vec<(f64, Small)> = rows.map_init(Vec::new, |found, x| self.jet(x, found)).collect();

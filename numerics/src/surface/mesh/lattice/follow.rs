@@ -9,9 +9,6 @@ use crate::points::cloud::Cloud;
 use crate::points::sampling::Sampling;
 use crate::surface::mesh::field::Field;
 
-/// Nodes evaluated between two looks at whether the work is cancelled.
-const NODES_AT_ONCE: usize = 1 << 14;
-
 /// Values of f at nodes, sorted by node.
 #[derive(Debug, Clone, Default)]
 pub struct Samples {
@@ -139,7 +136,9 @@ pub fn follow(
         if samples.n_nodes() + new.len() > max_nodes {
             return Err(NumericsError::TooManyNodes { limit: max_nodes });
         }
-        let values = evaluate(field, lattice, &new, observer)?;
+        observer.checkpoint()?;
+        let places: Vec<f64> = new.iter().flat_map(|&node| lattice.position(node)).collect();
+        let values = field.values(&places, observer)?;
         samples.merge(&new, &values);
         let crossed: Vec<(Node, [f64; 8])> = front
             .par_iter()
@@ -155,21 +154,6 @@ pub fn follow(
     }
     cells.par_sort_unstable();
     Ok(Followed { samples, cells })
-}
-
-fn evaluate(
-    field: &dyn Field,
-    lattice: &Lattice,
-    nodes: &[Node],
-    observer: &dyn Observer,
-) -> Result<Vec<f64>> {
-    let mut values = Vec::with_capacity(nodes.len());
-    for nodes in nodes.chunks(NODES_AT_ONCE) {
-        observer.checkpoint()?;
-        let places: Vec<f64> = nodes.iter().flat_map(|&node| lattice.position(node)).collect();
-        values.extend(field.values(&places, observer)?);
-    }
-    Ok(values)
 }
 
 /// Whether a value is inside.

@@ -19,9 +19,6 @@ const ILLINOIS_ROUNDS: usize = 8;
 /// Rounds in all. Where f jumps, halving leaves the place of the jump to a part [`PRECISION`] of the edge.
 const MAX_ROUNDS: usize = ILLINOIS_ROUNDS + 14;
 
-/// Edges evaluated between two looks at whether the work is cancelled.
-const EDGES_AT_ONCE: usize = 1 << 14;
-
 /// Finds the edges of the simplices whose ends differ in sign, sorted.
 pub fn crossed_edges(followed: &Followed, lattice: &Lattice) -> Vec<Edge> {
     let n_corners = 1 << lattice.dimension();
@@ -89,20 +86,6 @@ impl Bracket {
 /// # Errors
 /// Those of the field.
 pub fn roots(
-    field: &dyn Field,
-    lattice: &Lattice,
-    followed: &Followed,
-    edges: &[Edge],
-    observer: &dyn Observer,
-) -> Result<Vec<f64>> {
-    let mut found = Vec::with_capacity(edges.len() * lattice.dimension());
-    for edges in edges.chunks(EDGES_AT_ONCE) {
-        found.extend(roots_at_once(field, lattice, followed, edges, observer)?);
-    }
-    Ok(found)
-}
-
-fn roots_at_once(
     field: &dyn Field,
     lattice: &Lattice,
     followed: &Followed,

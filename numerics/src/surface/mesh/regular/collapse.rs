@@ -1,7 +1,10 @@
 //! Collapse of short edges.
 
+use super::EDGES_AT_ONCE;
 use super::star::Triangulation;
+use crate::error::Result;
 use crate::machine::vector::{dot, norm};
+use crate::observer::Observer;
 
 /// Part of the wanted length below which an edge collapses.
 const SHORT: f64 = 0.8;
@@ -15,8 +18,11 @@ const TURN: f64 = 0.5;
 /// Least number of triangles at a vertex.
 const LEAST_STAR: usize = 4;
 
-/// Collapses short edges, shortest first, each into its middle or its fixed end.
-pub fn collapse(mesh: &mut Triangulation, length: f64) {
+/// Collapses short edges, shortest first, each into its middle.
+///
+/// # Errors
+/// `NumericsError::Cancelled`.
+pub fn collapse(mesh: &mut Triangulation, length: f64, observer: &dyn Observer) -> Result<()> {
     let mut edges: Vec<(f64, [u32; 2])> = mesh
         .edges()
         .into_iter()
@@ -25,7 +31,10 @@ pub fn collapse(mesh: &mut Triangulation, length: f64) {
         .collect();
     edges.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut has_moved = vec![false; mesh.positions.len()];
-    for (_, [a, b]) in edges {
+    for (at, (_, [a, b])) in edges.into_iter().enumerate() {
+        if at % EDGES_AT_ONCE == 0 {
+            observer.checkpoint()?;
+        }
         // The ends of an edge of which one has moved are judged again in the next round.
         if has_moved[a as usize]
             || has_moved[b as usize]
@@ -41,6 +50,7 @@ pub fn collapse(mesh: &mut Triangulation, length: f64) {
             has_moved[a as usize] = true;
         }
     }
+    Ok(())
 }
 
 /// Whether the link condition holds, no edge becomes long, and no triangle turns over.

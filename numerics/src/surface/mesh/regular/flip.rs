@@ -1,7 +1,10 @@
 //! Flips of edges towards the Delaunay triangulation of the surface.
 
+use super::EDGES_AT_ONCE;
 use super::star::Triangulation;
+use crate::error::Result;
 use crate::machine::vector::{dot, norm};
+use crate::observer::Observer;
 
 /// Least cosine between the normals of the two triangles of a flipped edge, before and after.
 const FLAT: f64 = 0.7;
@@ -13,16 +16,23 @@ const LEAST_GAIN: f64 = 1e-9;
 const MAX_SWEEPS: usize = 20;
 
 /// Flips edges whose opposite angles sum to more than 180°, until there are none.
-pub fn flip(mesh: &mut Triangulation) {
+///
+/// # Errors
+/// `NumericsError::Cancelled`.
+pub fn flip(mesh: &mut Triangulation, observer: &dyn Observer) -> Result<()> {
     for _ in 0..MAX_SWEEPS {
         let mut n_flips = 0;
-        for [a, b] in mesh.edges() {
-            n_flips += usize::from(flip_edge(mesh, a, b));
+        for edges in mesh.edges().chunks(EDGES_AT_ONCE) {
+            observer.checkpoint()?;
+            for &[a, b] in edges {
+                n_flips += usize::from(flip_edge(mesh, a, b));
+            }
         }
         if n_flips == 0 {
-            return;
+            break;
         }
     }
+    Ok(())
 }
 
 fn flip_edge(mesh: &mut Triangulation, a: u32, b: u32) -> bool {

@@ -20,6 +20,9 @@ const ROUNDS: usize = 3;
 /// Smoothing steps of a round.
 const SMOOTHINGS: usize = 2;
 
+/// Edges looked at between two looks at whether the work is cancelled.
+const EDGES_AT_ONCE: usize = 1 << 14;
+
 /// Makes the triangles of a mesh (d = 3) regular, with edges about as long as `length`. Vertices stay on the
 /// surface of the field.
 ///
@@ -28,12 +31,11 @@ const SMOOTHINGS: usize = 2;
 pub fn regular(mesh: &Mesh, field: &dyn Field, length: f64, observer: &dyn Observer) -> Result<Mesh> {
     let mut triangles = Triangulation::of(mesh);
     for _ in 0..ROUNDS {
-        observer.checkpoint()?;
-        collapse::collapse(&mut triangles, length);
-        flip::flip(&mut triangles);
+        collapse::collapse(&mut triangles, length, observer)?;
+        flip::flip(&mut triangles, observer)?;
         for _ in 0..SMOOTHINGS {
             smooth::smooth(&mut triangles, field, observer)?;
-            flip::flip(&mut triangles);
+            flip::flip(&mut triangles, observer)?;
         }
     }
     Ok(triangles.into_mesh())

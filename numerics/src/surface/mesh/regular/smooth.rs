@@ -11,9 +11,6 @@ use crate::surface::mesh::field::Field;
 /// Least cosine between the normals of a triangle before and after its vertex has moved.
 const TURN: f64 = 0.5;
 
-/// Places evaluated between two looks at whether the work is cancelled.
-const AT_ONCE: usize = 1 << 14;
-
 /// Moves each vertex to the mean of its neighbours along the surface, and back onto the surface.
 ///
 /// # Errors
@@ -23,12 +20,9 @@ pub fn smooth(mesh: &mut Triangulation, field: &dyn Field, observer: &dyn Observ
         .filter(|&v| !mesh.is_fixed[v as usize] && !mesh.star(v).is_empty())
         .collect();
     let wanted: Vec<[f64; 3]> = moving.par_iter().map(|&vertex| tangential_mean(mesh, vertex)).collect();
-    for (vertices, places) in moving.chunks(AT_ONCE).zip(wanted.chunks(AT_ONCE)) {
-        observer.checkpoint()?;
-        let feet = field.feet(places.as_flattened(), observer)?.positions;
-        for (&vertex, foot) in vertices.iter().zip(feet.chunks_exact(3)) {
-            move_to(mesh, vertex, [foot[0], foot[1], foot[2]]);
-        }
+    let feet = field.feet(wanted.as_flattened(), observer)?.positions;
+    for (&vertex, foot) in moving.iter().zip(feet.chunks_exact(3)) {
+        move_to(mesh, vertex, [foot[0], foot[1], foot[2]]);
     }
     Ok(())
 }
