@@ -11,7 +11,6 @@ mod lattice;
 mod level_set;
 mod parts;
 mod places;
-pub mod price;
 mod regular;
 mod support;
 pub mod surface;
