@@ -6,6 +6,8 @@ use crate::function::local_kriging::price::{kriged_operator_price, kriging_price
 use crate::function::price::{self as functions, deviations_price, judging_price, many_price, samples_price};
 use crate::machine::price::{Price, Sizes};
 use crate::solver::price::FactorPrice;
+use crate::sums::price::pair_flops;
+use crate::surface::mesh::price::{LOCAL_EVALUATION, MeshSize};
 use crate::surface::operators::JUDGED_FUNCTIONALS;
 use crate::surface::operators::price::applied_price;
 use crate::surface::price::{
@@ -122,6 +124,14 @@ pub fn geometry_price(surface: SolverKind, asked: AskedOfSurface, sizes: Sizes) 
         SolverKind::Local => local_geometry_price(sizes),
         SolverKind::Dense => surfaces::geometry_price(asked, sizes),
     }
+}
+
+/// The price of meshing the surface of a model, or a level of its values.
+pub fn level_set_price(solver: SolverKind, size: MeshSize) -> Price {
+    size.price(match solver {
+        SolverKind::Dense => size.n_points as f64 * pair_flops(size.dimension, 0),
+        SolverKind::Local => LOCAL_EVALUATION,
+    })
 }
 
 /// The price of an operator applied to values by one solver on a surface by another.

@@ -158,6 +158,17 @@ fn a_curve_is_a_closed_polyline() {
 }
 
 #[test]
+fn few_points_are_a_closed_polyline_too() {
+    for n in [8, 12, 16] {
+        let cloud = circle(n);
+        let (kernel, alpha) = default_kernel_and_alpha(&cloud, Purpose::LevelSets);
+        let (found, closedness) = meshed(&surface(&factorize(&cloud, kernel, alpha)), &OPTIONS);
+        assert!(closedness.share > 0.9, "{n} points: {closedness:?}");
+        assert_eq!((found.parts.len(), found.parts[0].euler_characteristic), (1, 0), "{n} points");
+    }
+}
+
+#[test]
 fn the_bunny_is_one_closed_part() {
     let (cloud, spacing) = bunny();
     let (kernel, alpha) = default_kernel_and_alpha(&cloud, Purpose::LevelSets);

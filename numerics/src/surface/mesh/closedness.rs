@@ -12,6 +12,10 @@ use crate::surface::orientation::WindingNumbers;
 /// Distance of the places from their point, in spacings.
 const OFF: f64 = 2.0;
 
+/// Largest distance of the places from their point, over the radius of the cloud. Two spacings of eight
+/// points on a circle are its diameter.
+const OFF_AT_MOST: f64 = 0.35;
+
 /// Largest distance of a winding number from 0 outside, and from 1 inside.
 const NEAR: f64 = 0.3;
 
@@ -61,7 +65,8 @@ impl Closedness {
             observer.checkpoint()?;
             let normal = &normals[point * d..][..d];
             let off = |spacings: f64| -> Small {
-                let length = spacings * sampling.spacing(point);
+                let most = OFF_AT_MOST * cloud.radius();
+                let length = (spacings * sampling.spacing(point)).clamp(-most, most);
                 cloud.point(point).iter().zip(normal).map(|(x, c)| x + length * c).collect()
             };
             Ok([OFF, -OFF].map(|spacings| winding.at(&off(spacings))))

@@ -131,14 +131,15 @@ fn raw_mesh(request: &LevelSetRequest<'_>, observer: &dyn Observer) -> Result<Me
     Ok(Mesh { dimension: field.dimension(), vertices, cells })
 }
 
-/// Least size of a part, in spacings to the power d − 1. Smaller ones have fewer points than determine a
-/// surface.
-const LEAST_SIZE: f64 = 6.0;
+/// Least size of a part over d, in spacings to the power d − 1. Smaller ones have fewer points than determine
+/// a surface.
+const LEAST_SIZE: f64 = 2.0;
 
 /// Leaves out parts that no point is near to, or that are too small to mean anything. Returns them too.
 fn without_specks(mesh: Mesh, request: &LevelSetRequest<'_>) -> (Mesh, Vec<Part>) {
     let sampling = request.sampling;
-    let least = LEAST_SIZE * sampling.scales().spacing.powi(mesh.dimension as i32 - 1);
+    let least =
+        LEAST_SIZE * mesh.dimension as f64 * sampling.scales().spacing.powi(mesh.dimension as i32 - 1);
     let Parts { parts, of_vertex } = Parts::of(&mesh);
     let mut is_supported = vec![false; parts.len()];
     for (&part, support) in of_vertex.iter().zip(support(&mesh, sampling)) {

@@ -11,6 +11,7 @@ mod lattice;
 mod level_set;
 mod parts;
 mod places;
+pub mod price;
 mod regular;
 mod support;
 pub mod surface;

@@ -10,12 +10,15 @@ use super::level_set::{LevelSet, LevelSetRequest, Quality, level_set};
 use super::{Bounds, field::Field};
 use crate::error::{NumericsError, Result};
 use crate::function::interpolant::Interpolant;
+use crate::machine::small::zeros;
+use crate::machine::vector::norm;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::points::neighbours::Neighbour;
 use crate::points::sampling::Sampling;
-use crate::sums::jets::JetOrder;
+use crate::sums::jets::{JetOrder, Jets};
 use crate::surface::Surface;
+use crate::surface::curvature::principal_curvatures;
 use crate::surface::orientation::WindingNumbers;
 
 /// Part of the radius of a cloud, and spacings, by which the default box exceeds that of its points.
@@ -111,6 +114,26 @@ fn places_between(cloud: &Cloud, request: &LevelSetRequest<'_>, values: &[f64]) 
     };
     let inside = (0..cloud.n_points()).into_par_iter().filter(|&point| is_inside(values[point]));
     inside.map_init(Vec::new, from_point).flatten_iter().collect()
+}
+
+/// Computes the principal curvatures `[k, d−1]` and the mean curvatures `[k]` of level surfaces, 1/L,
+/// from jets with Hessians. They are 0 where u has no gradient.
+///
+/// `sign` is −1 for normals along which u falls, as those of a mesh, and +1 for the gradient's direction.
+pub fn curvatures_of_level(jets: &Jets, sign: f64) -> (Vec<f64>, Vec<f64>) {
+    let d = jets.dimension();
+    let (mut principal, mut mean) = (Vec::new(), Vec::new());
+    for vertex in 0..jets.n_queries() {
+        let (gradient, hessian) = (jets.gradient(vertex), jets.hessian(vertex));
+        let of_vertex = if norm(gradient) > 0.0 {
+            principal_curvatures(gradient, &hessian, sign).0
+        } else {
+            zeros(d - 1)
+        };
+        mean.push(of_vertex.iter().sum::<f64>() / (d - 1) as f64);
+        principal.extend(of_vertex);
+    }
+    (principal, mean)
 }
 
 /// The level of the surface: the mean of u over the points, which is 1 for α = 0 (errata.md, 13).
