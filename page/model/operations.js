@@ -1,0 +1,113 @@
+// What can be asked about a cloud, and the quantities of the answers.
+
+export const OPERATIONS = {
+  curvatures: { title: "Curvatures", path: "v1/curvatures", method: "curvatures" },
+  normals: { title: "Normals", path: "v1/normals", method: "normals" },
+  mesh: { title: "Mesh", path: "v1/level-set", method: "level_set" },
+};
+
+/** The members of a request, without its cloud. Absent ones are the service's to choose. */
+export function requestOf(settings) {
+  const request = {};
+  const include = [];
+  if (settings.deviations) include.push("deviations");
+  if (settings.operation === "mesh") {
+    include.unshift("curvatures");
+    if (settings.quality !== "regular") request.quality = settings.quality;
+    if (settings.open) request.open = true;
+    if (settings.step > 0) request.step = settings.step;
+  }
+  if (include.length > 0) request.include = include;
+  if (settings.surface !== "auto") request.surface = settings.surface;
+  if (settings.solver !== "auto") request.solver = settings.solver;
+  if (settings.duplicates !== "refuse") request.duplicates = settings.duplicates;
+  if (settings.alpha > 0) request.alpha = settings.alpha;
+  if (settings.family !== "auto") {
+    request.kernel = { family: settings.family };
+    if (settings.lengthScale > 0) request.kernel.length_scale = settings.lengthScale;
+    if (settings.family === "laplace" && settings.epsilon > 0) request.kernel.epsilon = settings.epsilon;
+  }
+  return request;
+}
+
+const NAMES = {
+  mean_curvatures: "mean curvature",
+  gaussian_curvatures: "Gaussian curvature",
+  principal_curvatures: "principal curvature",
+  gradient_norms: "gradient of u",
+  levels: "level of u",
+  residuals: "distance from the level",
+  position_deviations: "deviation of the position",
+  normal_deviations: "deviation of the normal",
+  principal_curvature_deviations: "deviation of a principal curvature",
+  mean_curvature_deviations: "deviation of the mean curvature",
+  gaussian_curvature_deviations: "deviation of the Gaussian curvature",
+};
+
+/** Vectors, which are drawn and not coloured by, and what is no quantity of a point. */
+const OTHERS = ["vertices", "normals", "cells", "principal_directions"];
+
+const SUBSCRIPTS = ["₁", "₂", "₃"];
+
+/** Quantities that points can be coloured by, from an answer and the values of the cloud. */
+export function quantitiesOf(answer, cloud) {
+  const of = [];
+  const isMesh = "vertices" in answer.tensors;
+  const n = isMesh ? answer.tensors.vertices.rows : cloud.points.rows;
+  for (const [name, tensor] of Object.entries(answer.tensors)) {
+    if (OTHERS.includes(name) || tensor.rows !== n) continue;
+    for (let at = 0; at < tensor.width; at++) {
+      const index = tensor.width > 1 ? SUBSCRIPTS[at] : "";
+      of.push({
+        id: tensor.width > 1 ? `${name}.${at}` : name,
+        title: (NAMES[name] ?? name.replaceAll("_", " ")) + index,
+        unit: unitOf(name, cloud.points.width),
+        isSigned: /curvatures$/.test(name),
+        values: columnOf(tensor, at),
+        deviations: columnOf(answer.tensors[`${name.replace(/s$/, "")}_deviations`], at),
+      });
+    }
+  }
+  if (!isMesh) {
+    for (const [name, values] of cloud.values) {
+      of.push({ id: `given.${name}`, title: `${name} (given)`, unit: "", isSigned: false, values });
+    }
+  }
+  // Mean curvature first, deviations last.
+  const rank = ({ id }) => (id === "mean_curvatures" ? 0 : id.includes("deviation") ? 2 : 1);
+  return of.sort((a, b) => rank(a) - rank(b));
+}
+
+function columnOf(tensor, at) {
+  if (!tensor) return undefined;
+  if (tensor.width === 1) return tensor.data;
+  return Float64Array.from({ length: tensor.rows }, (_, row) => tensor.data[row * tensor.width + at]);
+}
+
+function unitOf(name, d) {
+  if (name.startsWith("gaussian")) return d === 2 ? "1/L" : "1/L²";
+  if (name.includes("curvature")) return "1/L";
+  if (name === "normal_deviations") return "rad";
+  if (/^(residuals|position_deviations)$/.test(name)) return "L";
+  return "";
+}
+
+/** What can be done about a refusal: a label, and the settings that it sets. */
+export function remedyOf({ slug, problem }, settings) {
+  const pointer = problem.errors?.[0]?.pointer ?? "";
+  if (problem.minimum_alpha > 0) {
+    const alpha = Number(problem.minimum_alpha.toPrecision(2));
+    return { label: `Use α = ${alpha}`, set: { alpha } };
+  }
+  if (slug === "duplicate-points") return { label: "Merge equal points", set: { duplicates: "merge" } };
+  if (pointer === "/open") return { label: "Let the surface end with its points", set: { open: true } };
+  if (pointer === "/step" && settings.step > 0) return { label: "Choose the step automatically", set: { step: 0 } };
+  if (slug === "kernel-not-smooth") return { label: "Choose the kernel automatically", set: { family: "auto" } };
+  if (["unsupported-by-solver", "problem-too-large"].includes(slug)) {
+    return { label: "Let the service choose", set: { solver: "auto", surface: "auto", family: "auto", alpha: 0 } };
+  }
+  if (slug === "invalid-request" && pointer.startsWith("/kernel")) {
+    return { label: "Choose the kernel automatically", set: { family: "auto", lengthScale: 0, epsilon: 0 } };
+  }
+  return undefined;
+}

@@ -1,0 +1,56 @@
+// Requests and answers in safetensors: arrays as raw float64, everything else as JSON in the metadata.
+
+/** An array with its shape, row major. */
+export class Tensor {
+  constructor(data, shape) {
+    this.data = data;
+    this.shape = shape;
+  }
+
+  get rows() {
+    return this.shape[0];
+  }
+
+  /** Numbers in a row. */
+  get width() {
+    return this.shape.slice(1).reduce((product, length) => product * length, 1);
+  }
+}
+
+/** The bytes of a file with float64 tensors by name, and a JSON document in the metadata entry `request`. */
+export function encode(tensors, request) {
+  const header = { __metadata__: { request: JSON.stringify(request) } };
+  let end = 0;
+  for (const [name, { data, shape }] of Object.entries(tensors)) {
+    header[name] = { dtype: "F64", shape, data_offsets: [end, end + data.byteLength] };
+    end += data.byteLength;
+  }
+  const text = new TextEncoder().encode(JSON.stringify(header));
+  // The numbers begin at a multiple of eight bytes, filled by spaces.
+  const length = Math.ceil(text.length / 8) * 8;
+  const bytes = new Uint8Array(8 + length + end);
+  bytes.fill(32, 8, 8 + length);
+  new DataView(bytes.buffer).setBigUint64(0, BigInt(length), true);
+  bytes.set(text, 8);
+  let start = 8 + length;
+  for (const { data } of Object.values(tensors)) {
+    bytes.set(new Uint8Array(data.buffer, data.byteOffset, data.byteLength), start);
+    start += data.byteLength;
+  }
+  return bytes;
+}
+
+/** The tensors of an answer by name, and its other members. */
+export function decode(buffer) {
+  const length = Number(new DataView(buffer).getBigUint64(0, true));
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 8, length)));
+  const { __metadata__: metadata, ...described } = header;
+  const tensors = {};
+  for (const [name, { dtype, shape, data_offsets: [start, end] }] of Object.entries(described)) {
+    const bytes = buffer.slice(8 + length + start, 8 + length + end);
+    // Whole numbers here are indices, far below 2³².
+    const data = dtype === "I64" ? new Uint32Array(bytes).filter((_, at) => at % 2 === 0) : new Float64Array(bytes);
+    tensors[name] = new Tensor(data, shape);
+  }
+  return { tensors, fields: JSON.parse(metadata.response) };
+}

@@ -1,0 +1,134 @@
+// What the picture says in words and numbers: summary, marks by reason, the point under the pointer, diagnostics.
+
+import { SUPPORT, cssOf, shown } from "./colours.js";
+
+const REASONS = {
+  vanishing_gradient: "the function has no gradient",
+  unaffordable_rescue: "too many points without a gradient",
+  kernel_too_rough: "the kernel is too rough",
+  far_from_cloud: "far from the cloud",
+  under_resolved: "too few points for so much curvature",
+  ambiguous_side: "inside and outside are not clear",
+  uncertain: "less certain than it seems",
+};
+
+/** Colours of marks, none of which the scales have. */
+const MARKS = [[0.85, 0.1, 0.75], [0.1, 0.1, 0.1], [0.95, 0.45, 0], [0, 0.5, 0.2], [0.3, 0.2, 0.8], [0.6, 0.4, 0.2], [0.9, 0.2, 0.2]];
+
+export const element = (name, properties = {}, ...children) => {
+  const made = Object.assign(document.createElement(name), properties);
+  made.append(...children);
+  return made;
+};
+
+/** Points without an answer, or with a doubtful one, by reason. */
+export function markedOf(answer) {
+  const reasons = new Map();
+  for (const { query, reason } of answer.fields.degenerate ?? []) {
+    if (!reasons.has(reason)) reasons.set(reason, { points: [], colour: MARKS[reasons.size % MARKS.length] });
+    reasons.get(reason).points.push(query);
+  }
+  return reasons;
+}
+
+export function words(reason) {
+  return REASONS[reason] ?? reason.replaceAll("_", " ");
+}
+
+/** Check boxes for the marks of each reason. */
+export function showMarks(into, reasons, changed) {
+  into.replaceChildren(...[...reasons].map(([reason, { points, colour }]) => {
+    const box = element("input", { type: "checkbox", checked: true });
+    box.addEventListener("change", () => changed(reason, box.checked));
+    const swatch = element("span", { className: "swatch" });
+    swatch.style.color = cssOf(colour);
+    return element("label", { className: "check" }, box, swatch, `${points.length.toLocaleString("en")} ${words(reason)}`);
+  }));
+}
+
+/** One sentence for everyone, and for screen readers. */
+export function summaryOf({ answer, cloud, quantity, range, reasons }) {
+  const n = (answer.tensors.vertices ?? cloud.points).rows.toLocaleString("en");
+  const what = answer.tensors.vertices ? "vertices" : "points";
+  const nMarked = [...reasons.values()].reduce((sum, { points }) => sum + points.length, 0);
+  const parts = [`${cloud.name}: ${n} ${what}`];
+  if (quantity) parts.push(`${quantity.title} ${shown(range.low)} to ${shown(range.high)} ${quantity.unit}`.trim());
+  if (nMarked > 0) parts.push(`${nMarked.toLocaleString("en")} marked`);
+  for (const part of (answer.fields.parts ?? []).slice(0, 3)) {
+    parts.push(`a part with Euler characteristic ${part.euler_characteristic} and ${part.n_boundary_edges} open edges`);
+  }
+  for (const warning of answer.fields.diagnostics?.warnings ?? []) parts.push(warning.detail);
+  return `${parts.join("; ")}.`;
+}
+
+/** Value and deviation at a point. */
+export function valueAt(quantity, point) {
+  if (!quantity) return "";
+  const deviation = quantity.deviations?.[point];
+  const known = Number.isFinite(deviation) ? ` ± ${shown(deviation)}` : "";
+  return `${shown(quantity.values[point])}${known} ${quantity.unit}`.trim();
+}
+
+/** Everything that is known of a point. */
+export function showPinned(into, { point, quantities, answer, cloud, reasons }) {
+  const positions = answer.tensors.vertices ?? cloud.points;
+  const d = positions.width;
+  const position = [...positions.data.subarray(point * d, (point + 1) * d)].map(shown).join(", ");
+  const rows = [["position", position]];
+  rows.push(...quantities.filter(({ id }) => !id.includes("deviation")).map((of) => [of.title, valueAt(of, point)]));
+  if (answer.fields.support) rows.push(["rests on", answer.fields.support[point]]);
+  for (const [reason, { points }] of reasons) if (points.includes(point)) rows.push(["marked", words(reason)]);
+  const close = element("button", { type: "button", textContent: "Close" });
+  close.addEventListener("click", () => (into.hidden = true));
+  into.replaceChildren(element("strong", { textContent: `Point ${point}` }), list(rows), close);
+  into.hidden = false;
+}
+
+function list(rows) {
+  const entries = rows.flatMap(([name, text]) => [element("dt", { textContent: name }), element("dd", { textContent: text })]);
+  return element("dl", {}, ...entries);
+}
+
+export function showSupport(into, answer) {
+  const support = answer.fields.support;
+  if (!support) return;
+  const counts = Object.entries(SUPPORT).map(([word, colour]) => {
+    const swatch = element("span", { className: "swatch" });
+    swatch.style.color = colour;
+    const n = support.filter((of) => of === word).length;
+    return element("div", {}, swatch, ` ${n.toLocaleString("en")} ${word}`);
+  });
+  into.replaceChildren(...counts);
+}
+
+export function showDiagnostics(into, answer) {
+  const used = answer.fields.diagnostics ?? {};
+  const kernel = used.kernel ?? {};
+  const timing = answer.timing ?? {};
+  const rows = [
+    ["solver", used.solver],
+    ["kernel", Object.entries(kernel).map(([name, value]) => `${name} ${typeof value === "number" ? shown(value) : value}`).join(", ")],
+    ["α", used.alpha === undefined ? undefined : shown(used.alpha)],
+    ["condition", used.reciprocal_condition > 0 ? shown(1 / used.reciprocal_condition) : undefined],
+    ["sides found", answer.fields.closedness === undefined ? undefined : `${(100 * answer.fields.closedness).toFixed(1)} %`],
+    ["time", answer.seconds === undefined ? "computed when the page was made" : `${answer.seconds.toFixed(2)} s`],
+    ...Object.entries(timing).map(([name, duration]) => [`of it ${name}`, name === "factor" && duration === 0 ? "cached" : `${duration} ms`]),
+  ];
+  const known = rows.filter(([, text]) => text !== undefined && text !== "");
+  into.replaceChildren(...list(known).children);
+}
+
+/** A refusal with its remedy as a button. */
+export function showRefusal(into, { title, detail, remedy, apply }) {
+  const buttons = element("div", { className: "buttons" });
+  if (remedy) {
+    const button = element("button", { type: "button", textContent: remedy.label });
+    button.addEventListener("click", () => ((into.hidden = true), apply(remedy.set)));
+    buttons.append(button);
+  }
+  const close = element("button", { type: "button", textContent: "Close" });
+  close.addEventListener("click", () => (into.hidden = true));
+  buttons.append(close);
+  into.replaceChildren(element("h2", { textContent: title }), element("p", { textContent: detail }), buttons);
+  into.hidden = false;
+}
