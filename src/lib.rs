@@ -13,6 +13,7 @@ pub mod store;
 pub mod http;
 
 pub mod config;
+pub mod files;
 mod machine;
 mod memory;
 pub mod server;

@@ -1,10 +1,11 @@
-//! Entry point: reads the configuration, then serves, or asks a running server whether it is ready, or makes
-//! a key.
+//! Entry point: reads the configuration, then serves, answers a file, asks a running server whether it is
+//! ready, or makes a key.
 
 use std::process::ExitCode;
 
 use clap::Parser;
 use gramian::config::Config;
+use gramian::files::{self, FileCommand};
 use gramian::http::access;
 use gramian::http::serve::durable;
 use gramian::http::state::app::App;
@@ -37,6 +38,8 @@ enum Command {
         /// Name of its holder: letters, digits, '-' and '_'.
         name: String,
     },
+    #[command(flatten)]
+    File(FileCommand),
 }
 
 fn main() -> ExitCode {
@@ -47,6 +50,7 @@ fn main() -> ExitCode {
             Ok(false) => Err("not ready".into()),
             Err(error) => Err(error.into()),
         },
+        Some(Command::File(command)) => return files::run(command, config),
         Some(Command::Key { name }) => make_key(&name).map_err(Into::into),
         None => {
             let log = telemetry::start();

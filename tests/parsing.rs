@@ -13,7 +13,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use gramian::http::problem::Problem;
-use gramian::http::wire::negotiation::{Coding, Format};
+use gramian::http::wire::negotiation::{BodyFormat, Coding};
 use gramian::http::wire::read::body::RequestBody;
 use gramian::http::wire::read::limits::ParseContext;
 use gramian::http::wire::read::members::present_unless_empty;
@@ -102,7 +102,7 @@ struct Outcome {
     took: Duration,
 }
 
-fn parse(format: Format, coding: Coding, body: &[u8]) -> Outcome {
+fn parse(format: BodyFormat, coding: Coding, body: &[u8]) -> Outcome {
     let before = ALLOCATOR.current_usage();
     ALLOCATOR.reset_peak_usage();
     let began = Instant::now();
@@ -110,8 +110,8 @@ fn parse(format: Format, coding: Coding, body: &[u8]) -> Outcome {
     let unpacked = request.unpack(&CONTEXT, is_room);
     let problem = match (unpacked, format) {
         (Err(problem), _) => Some(problem),
-        (Ok(body), Format::Npy | Format::Ply) => body.parse::<CloudRequest>(&CONTEXT).err(),
-        (Ok(body), Format::Json | Format::Safetensors) => body.parse::<Request>(&CONTEXT).err(),
+        (Ok(body), BodyFormat::Npy | BodyFormat::Ply) => body.parse::<CloudRequest>(&CONTEXT).err(),
+        (Ok(body), BodyFormat::Json | BodyFormat::Safetensors) => body.parse::<Request>(&CONTEXT).err(),
     };
     let took = began.elapsed();
     let peak = ALLOCATOR.peak_usage() - before;
@@ -124,7 +124,7 @@ fn kind(outcome: &Outcome) -> &str {
 }
 
 /// Parses a body, and checks its outcome, its time and its memory.
-fn expect(what: &str, format: Format, body: &[u8], expected: &str) -> Outcome {
+fn expect(what: &str, format: BodyFormat, body: &[u8], expected: &str) -> Outcome {
     let outcome = parse(format, Coding::Identity, body);
     assert_eq!(kind(&outcome), expected, "{what}: {:?}", outcome.problem);
     let allowed = 3 * body.len() + BASE_BYTES;
@@ -158,7 +158,8 @@ fn lists_beyond_the_limits_are_counted_but_not_kept() {
         (r#"{"kernel":{"family":"g\u0061uss"},"values":[0"#, ",1", "]}", "/values", 2000, N_BYTES / 2 + 1),
         (r#"{"kernel":{"family":"g\u0061uss"},"queries":[[0"#, ",1", "]]}", "/queries", 16, N_BYTES / 2 + 1),
     ] {
-        let outcome = expect(head, Format::Json, &repeated(head, text, tail), "/problems/problem-too-large");
+        let outcome =
+            expect(head, BodyFormat::Json, &repeated(head, text, tail), "/problems/problem-too-large");
         let problem = outcome.problem.as_ref().unwrap();
         assert_eq!((pointer(&outcome), &problem["limit"]), (at, &limit.into()), "{problem}");
         assert_eq!(problem["required"], length, "{problem}");
@@ -187,19 +188,23 @@ fn texts_nesting_and_names_of_megabytes_are_refused_in_bounds() {
         (r#"{"cloud":{"points":[[0],[1,2]"#, " ", r#",[3,"x"]]}}"#, "invalid-request", "/cloud/points/2/1"),
     ] {
         let expected = if expected == "accepted" { expected.into() } else { format!("/problems/{expected}") };
-        let outcome = expect(head, Format::Json, &repeated(head, text, tail), &expected);
+        let outcome = expect(head, BodyFormat::Json, &repeated(head, text, tail), &expected);
         if at != "-" {
             assert_eq!(pointer(&outcome), at);
         }
         let n_shown = outcome.problem.map_or(0, |problem| problem.to_string().len());
         assert!(n_shown < 4000, "{head}: {n_shown} bytes of problem");
     }
-    let named =
-        expect("a name", Format::Json, &repeated(r#"{""#, "\u{7f}", r#"":1}"#), "/problems/invalid-request");
+    let named = expect(
+        "a name",
+        BodyFormat::Json,
+        &repeated(r#"{""#, "\u{7f}", r#"":1}"#),
+        "/problems/invalid-request",
+    );
     assert!(pointer(&named).len() < 300);
     let n = 1 << 20;
     let nested = format!(r#"{{"cloud":{{"points":[[{}{}]]}}}}"#, "[".repeat(n), "]".repeat(n));
-    expect("closed", Format::Json, nested.as_bytes(), "/problems/malformed-json");
+    expect("closed", BodyFormat::Json, nested.as_bytes(), "/problems/malformed-json");
 }
 
 /// Returns a safetensors file with this header, as it is.
@@ -215,7 +220,7 @@ fn headers_of_tensors_are_bounded() {
     let tensor = |name: usize| format!(r#""{name}":{{"dtype":"F64","shape":[0],"data_offsets":[0,0]}}"#);
     let tensors = |n: usize| format!("{{{}}}", (0..n).map(tensor).collect::<Vec<_>>().join(","));
     let refused = |what: &str, header: String, expected: &str| {
-        expect(what, Format::Safetensors, &with_header(&header, &[]), &format!("/problems/{expected}"))
+        expect(what, BodyFormat::Safetensors, &with_header(&header, &[]), &format!("/problems/{expected}"))
     };
     for text in ["[[[[", "[1,1]", "{}", "\u{7f}"].map(|text| text.repeat(N_BYTES / text.len())) {
         let outcome = refused("a long text", metadata(&text), "body-too-large");
@@ -250,7 +255,7 @@ fn tensors_beyond_the_limits_are_refused_by_their_shape() {
         let header =
             format!(r#"{{"{name}":{{"dtype":"F32","shape":{shape},"data_offsets":[0,{n_bytes}]}}}}"#);
         let body = with_header(&header, &vec![0; n_bytes]);
-        let outcome = expect(name, Format::Safetensors, &body, "/problems/problem-too-large");
+        let outcome = expect(name, BodyFormat::Safetensors, &body, "/problems/problem-too-large");
         let problem = outcome.problem.as_ref().unwrap();
         assert_eq!((pointer(&outcome), &problem["limit"]), (at, &limit.into()), "{problem}");
         assert_eq!(problem["required"], required, "{problem}");
@@ -261,7 +266,7 @@ fn tensors_beyond_the_limits_are_refused_by_their_shape() {
         let mut body = b"\x93NUMPY\x02\x00".to_vec();
         body.extend((header.len() as u32).to_le_bytes());
         body.extend(header.bytes());
-        expect("a header of npy", Format::Npy, &body, "/problems/malformed-body");
+        expect("a header of npy", BodyFormat::Npy, &body, "/problems/malformed-body");
     }
 }
 
@@ -285,17 +290,17 @@ fn compressed_bodies_take_their_plain_size_at_most() {
         plain.resize(LIMIT_BYTES, b' ');
         *plain.last_mut().unwrap() = b'}';
         let body = packed(coding, &plain);
-        let outcome = parse(Format::Json, coding, &body);
+        let outcome = parse(BodyFormat::Json, coding, &body);
         assert_eq!(kind(&outcome), "accepted");
         assert!(outcome.peak <= plain.len() + body.len() + BASE_BYTES, "{coding:?}: {}", outcome.peak);
         plain.push(b' ');
         let body = packed(coding, &plain);
-        let outcome = parse(Format::Json, coding, &body);
+        let outcome = parse(BodyFormat::Json, coding, &body);
         assert_eq!(kind(&outcome), "/problems/body-too-large");
         assert!(outcome.peak <= body.len() + BASE_BYTES, "{coding:?}: {}", outcome.peak);
         // A body of nothing but empty compressed members.
         let member = packed(coding, b"");
-        let outcome = parse(Format::Json, coding, &member.repeat((1 << 20) / member.len()));
+        let outcome = parse(BodyFormat::Json, coding, &member.repeat((1 << 20) / member.len()));
         assert_eq!(kind(&outcome), "/problems/malformed-json");
         assert!(outcome.took < Duration::from_secs(20), "{coding:?}: {:?}", outcome.took);
     }
@@ -364,21 +369,21 @@ fn files_that_announce_more_than_they_have_take_nothing_for_it() {
             for what in ["element vertex 2", "element camera 1"] {
                 let (name, _) = what.rsplit_once(' ').unwrap();
                 let head = ply_head(format, 2).replace(what, &format!("{name} {count}"));
-                expect(what, Format::Ply, head.as_bytes(), "/problems/malformed-body");
+                expect(what, BodyFormat::Ply, head.as_bytes(), "/problems/malformed-body");
             }
         }
     }
     let head = ply_head("binary_little_endian", 2);
     let endless = head.replace("end_header", &"comment 0123456789\n".repeat(N_BYTES / 20));
-    expect("a long header", Format::Ply, endless.as_bytes(), "/problems/malformed-body");
+    expect("a long header", BodyFormat::Ply, endless.as_bytes(), "/problems/malformed-body");
     let names = head.replace("property uchar red\n", &format!("property uchar {}\n", "r".repeat(60_000)));
-    expect("a long name", Format::Ply, names.as_bytes(), "/problems/malformed-body");
+    expect("a long name", BodyFormat::Ply, names.as_bytes(), "/problems/malformed-body");
     let words = format!("{}1 7\n{}", ply_head("ascii", 2), "x".repeat(N_BYTES));
-    let outcome = expect("a long word", Format::Ply, words.as_bytes(), "/problems/malformed-body");
+    let outcome = expect("a long word", BodyFormat::Ply, words.as_bytes(), "/problems/malformed-body");
     assert!(outcome.problem.unwrap().to_string().len() < 1000);
     // Nothing is read beyond the limit of points.
     let many = format!("{}1 7\n{}", ply_head("ascii", 3000), "0 0 0 0 0 1 0 0\n".repeat(3000));
-    let outcome = expect("many", Format::Ply, many.as_bytes(), "/problems/problem-too-large");
+    let outcome = expect("many", BodyFormat::Ply, many.as_bytes(), "/problems/problem-too-large");
     assert!(pointer(&outcome) == "/points" && outcome.problem.unwrap()["required"] == 3000);
 }
 
@@ -449,11 +454,11 @@ fn mutate(body: &mut Vec<u8>, at: proptest::sample::Index, mutation: &Mutation) 
 fn mutated_bodies_are_read_or_refused() {
     let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let originals = [
-        (Format::Json, json()),
-        (Format::Safetensors, safetensors()),
-        (Format::Npy, npy()),
-        (Format::Ply, ply_in_text()),
-        (Format::Ply, ply_in_binary()),
+        (BodyFormat::Json, json()),
+        (BodyFormat::Safetensors, safetensors()),
+        (BodyFormat::Npy, npy()),
+        (BodyFormat::Ply, ply_in_text()),
+        (BodyFormat::Ply, ply_in_binary()),
     ];
     for (format, body) in &originals {
         let outcome = parse(*format, Coding::Identity, body);

@@ -11,7 +11,7 @@ use std::time::Duration;
 use axum::response::Response;
 use gramian::http::compute::Compute;
 use gramian::http::problem::Problem;
-use gramian::http::wire::negotiation::{Coding, Format, Wanted};
+use gramian::http::wire::negotiation::{BodyFormat, Coding, Format, Wanted};
 use gramian::http::wire::read::body::RequestBody;
 use gramian::http::wire::read::limits::ParseContext;
 use gramian::http::wire::read::members::present_unless_empty;
@@ -112,7 +112,7 @@ fn ply_in_binary(points: &[f64], is_double: bool) -> Vec<u8> {
 }
 
 /// Registers the cloud of a body in a store, and returns the bytes that are kept.
-fn register(format: Format, body: Vec<u8>) -> usize {
+fn register(format: BodyFormat, body: Vec<u8>) -> usize {
     let limit = body.len();
     let request: Request = RequestBody::new(format, Coding::Identity, body, limit)
         .unpack(&ParseContext::UNLIMITED, |_| Ok(()))
@@ -167,13 +167,13 @@ async fn clouds_come_in_and_answers_go_out_within_three_times_their_arrays() {
     let points = numbers(3 * N);
     let one = 8 * points.len();
     for (name, format, body, n_arrays, is_binary) in [
-        ("JSON", Format::Json, json(&points, false), one, false),
-        ("JSON with normals", Format::Json, json(&points, true), 2 * one, false),
-        ("npy", Format::Npy, npy(&points), one, true),
-        ("safetensors with normals", Format::Safetensors, safetensors(&points), 2 * one, true),
-        ("PLY in text with normals", Format::Ply, ply_in_text(&points), 2 * one, false),
-        ("PLY with normals", Format::Ply, ply_in_binary(&points, true), 2 * one, true),
-        ("PLY of 32 bits with normals", Format::Ply, ply_in_binary(&points, false), 2 * one, true),
+        ("JSON", BodyFormat::Json, json(&points, false), one, false),
+        ("JSON with normals", BodyFormat::Json, json(&points, true), 2 * one, false),
+        ("npy", BodyFormat::Npy, npy(&points), one, true),
+        ("safetensors with normals", BodyFormat::Safetensors, safetensors(&points), 2 * one, true),
+        ("PLY in text with normals", BodyFormat::Ply, ply_in_text(&points), 2 * one, false),
+        ("PLY with normals", BodyFormat::Ply, ply_in_binary(&points, true), 2 * one, true),
+        ("PLY of 32 bits with normals", BodyFormat::Ply, ply_in_binary(&points, false), 2 * one, true),
     ] {
         let n_body = body.len();
         let (n_kept, beside) = peak_of(|| register(format, body));

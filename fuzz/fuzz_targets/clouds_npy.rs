@@ -3,9 +3,9 @@
 #![no_main]
 
 use gramian::http::reading::read_as;
-use gramian::http::wire::negotiation::{Coding, Format};
+use gramian::http::wire::negotiation::{BodyFormat, Coding};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
-    let _ = read_as("create_cloud", Format::Npy, Coding::Identity, data);
+    let _ = read_as("create_cloud", BodyFormat::Npy, Coding::Identity, data);
 });

@@ -3,11 +3,11 @@
 #![no_main]
 
 use gramian::http::reading::{OPERATIONS, read_as};
-use gramian::http::wire::negotiation::{Coding, Format};
+use gramian::http::wire::negotiation::{BodyFormat, Coding};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
     let Some((&first, body)) = data.split_first() else { return };
     let operation = OPERATIONS[usize::from(first) % OPERATIONS.len()];
-    let _ = read_as(operation, Format::Safetensors, Coding::Identity, body);
+    let _ = read_as(operation, BodyFormat::Safetensors, Coding::Identity, body);
 });

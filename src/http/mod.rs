@@ -30,8 +30,9 @@ use utoipa_swagger_ui::SwaggerUi;
 use crate::config::Origins;
 use around::{authentication, middleware};
 use jobs::Runner;
+use routes::pages::viewer;
 pub use routes::reading;
-use routes::surface::{curvatures, laplace_beltrami, normals, surface_gradient};
+use routes::surface::{curvatures, laplace_beltrami, level_set, normals, surface_gradient};
 use routes::tiles::{coarse, regions, sides};
 use routes::values::{interpolation, model_selection, posterior};
 use routes::{clouds, estimate, jobs as job_routes, kernels, pages, process};
@@ -50,6 +51,7 @@ pub fn router(app: Arc<App>) -> (Router, Runner) {
         .layer(from_fn_with_state(app.clone(), authentication::authenticate));
     let router = v1
         .merge(probes)
+        .route("/page/{*path}", get(viewer::get_page_file))
         .route("/openapi.json", document)
         .route("/openapi-3.0.json", document_3_0)
         .merge(
@@ -101,6 +103,7 @@ fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
         .routes(routes!(model_selection::select_model))
         .routes(routes!(regions::compute_regions))
         .routes(routes!(normals::compute_normals))
+        .routes(routes!(level_set::compute_level_set))
         .routes(routes!(curvatures::compute_curvatures))
         .routes(routes!(surface_gradient::compute_surface_gradient))
         .routes(routes!(surface_gradient::assemble_surface_gradient_matrix))
@@ -113,7 +116,7 @@ fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
         .routes(routes!(process::check_ready))
         .routes(routes!(process::get_metrics))
         .routes(routes!(process::get_version))
-        .routes(routes!(pages::get_start_page))
+        .routes(routes!(viewer::get_start_page))
         .routes(routes!(pages::list_problem_pages))
         .routes(routes!(pages::get_problem_page));
     let (v1, mut document) = v1.split_for_parts();

@@ -41,7 +41,8 @@ async fn the_root_page_links_to_every_page() {
     for path in ["docs/", "openapi.json", "openapi-3.0.json", "problems"] {
         assert!(links.iter().any(|link| link == path), "{links:?}");
     }
-    for link in links {
+    // Files of the page itself are not in the document; they have tests of their own.
+    for link in links.iter().filter(|link| !link.starts_with("page/")) {
         assert_eq!(server.get(&format!("/{link}")).await.status, 200, "{link}");
     }
 }

@@ -140,3 +140,44 @@ async fn tiles_that_cannot_be_are_refused_by_their_place() {
     let empty = server.post("/v1/regions", &json!({"cloud": cloud, "own": []})).await.expect_ok();
     assert_eq!((&empty["regions"], &empty["n_edges"]), (&json!([]), &json!(0)));
 }
+
+/// A request for the regions of the upper half of a sphere, whose points were changed.
+fn upper_half(change: impl Fn([f64; 3]) -> [f64; 3]) -> Value {
+    // Coordinates of few digits, so that units and offsets change them without rounding.
+    let round = |x: [f64; 3]| x.map(|c| (c * 1024.0).round() / 1024.0);
+    let points: Vec<_> = fibonacci_sphere(1000).into_iter().map(round).collect();
+    let (part, own) = cap(&points, 1.0);
+    let changed: Vec<_> = part.iter().map(|x| change(*x)).collect();
+    json!({"cloud": {"points": changed, "normals": part}, "own": own})
+}
+
+#[tokio::test]
+async fn eight_equal_requests_for_regions_have_one_answer() {
+    let server = Server::start().await;
+    let body = upper_half(|x| x);
+    let asked = (0..8).map(|_| server.post("/v1/regions", &body));
+    let answers: Vec<Value> =
+        futures_util::future::join_all(asked).await.into_iter().map(|answer| answer.expect_ok()).collect();
+    assert!(answers.iter().all(|answer| answer == &answers[0]));
+}
+
+#[tokio::test]
+async fn regions_follow_units_and_offsets() {
+    let server = Server::start().await;
+    let plain = server.post("/v1/regions", &upper_half(|x| x)).await.expect_ok();
+    let first = &plain["regions"][0];
+    for (unit, offset) in [(1.0 / 4096.0, 0.0), (1048576.0, 0.0), (1.0, 1024.0)] {
+        let body = upper_half(|x| x.map(|c| unit * c + offset));
+        let moved = server.post("/v1/regions", &body).await.expect_ok();
+        assert_eq!(moved["labels"], plain["labels"]);
+        let region = &moved["regions"][0];
+        assert_eq!(region["n_points"], first["n_points"]);
+        let area = |region: &Value| region["area"].as_f64().unwrap();
+        // Rounding of the squares of coordinates up to the offset.
+        let relative = 1e-9 * (1.0 + offset * offset);
+        assert!((area(region) / (unit * unit) - area(first)).abs() <= relative * area(first), "{region}");
+        for (now, before) in numbers(&region["centre"]).iter().zip(numbers(&first["centre"])) {
+            assert!(((now - offset) / unit - before).abs() <= 1e-9 * (1.0 + offset), "{now} {before}");
+        }
+    }
+}

@@ -1643,6 +1643,139 @@ In Python: `scipy.sparse.csr_matrix((data, indices, indptr), shape)`.*/
             Default::default()
         }
     }
+    ///A cloud in the plane or in space whose surface is to be meshed, or values whose level is.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    #[serde(deny_unknown_fields)]
+    pub struct LevelSetRequest {
+        /**Added to the diagonal of the Gram matrix as given, unit of the values squared.
+
+0 interpolates, and the variance of the noise regresses. Default: 1e-10 if a kernel is given.
+Without a kernel, alpha is chosen. For values it is their noise by the likelihood. For
+surfaces it follows the noise of the points and is at least 1e-3.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub alpha: ::std::option::Option<f64>,
+        /**The box that the surface is followed in. Default: where the cloud is, and a fifth of its
+radius around.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub bounds: ::std::option::Option<MeshBounds>,
+        ///The points at which values are known, or that sample the surface.
+        pub cloud: CloudRef,
+        ///The treatment of points that coincide when alpha is 0.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub duplicates: ::std::option::Option<DuplicatePolicy>,
+        /**What local regressions take instead of learning it: the hyperparameters of an answer
+about a cloud that has the points of this surface.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub hyperparameters: ::std::option::Option<Hyperparameters>,
+        ///Optional parts of the answer. Default: none.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub include: ::std::vec::Vec<MeshInclude>,
+        /**The kernel. If absent, it is chosen.
+
+A surface's kernel is chosen from the cloud. A kernel for values is chosen by their
+likelihood, together with its variance and, unless they are given, the noise and a constant
+mean. The diagnostics repeat all of it.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub kernel: ::std::option::Option<Kernel>,
+        ///The level of the function through `values`. Default: the median of the values.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub level: ::std::option::Option<f64>,
+        ///The mean of the function through `values`. Default: a constant without `kernel`, zero with one.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub mean: ::std::option::Option<MeanChoice>,
+        ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub noise_variances: ::std::vec::Vec<f64>,
+        ///True if the surface ends where its points end. Default: false. A closed mesh bridges holes.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub open: ::std::option::Option<bool>,
+        ///The direction of normals, and so the order of the vertices of a cell. Default: `outward`.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub orientation: ::std::option::Option<OrientationChoice>,
+        ///The shape of the triangles. Default: `regular`.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub quality: ::std::option::Option<MeshQuality>,
+        ///The method that solves the linear system.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub solver: ::std::option::Option<SolverChoice>,
+        /**The longest edge of the lattice that follows the surface. Default: the median spacing of the
+points.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub step: ::std::option::Option<f64>,
+        ///The function whose level set is the surface. Default: `auto`.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub surface: ::std::option::Option<SurfaceChoice>,
+        /**A number for each point of the cloud. If given, a level of the function through them is meshed.
+
+Default: the surface that the cloud samples is meshed.*/
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub values: ::std::vec::Vec<f64>,
+    }
+    impl LevelSetRequest {
+        pub fn builder() -> builder::LevelSetRequest {
+            Default::default()
+        }
+    }
+    ///A mesh of segments (in the plane) or triangles (in space).
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    pub struct LevelSetResponse {
+        /**The vertices of each segment or triangle, by index from 0.
+
+Seen from the side that normals point to, triangles run counter-clockwise. Segments run
+counter-clockwise around the inside.*/
+        pub cells: ::std::vec::Vec<::std::vec::Vec<u64>>,
+        /**The share of the points with the inside on one side and the outside on the other, by winding
+numbers.
+
+Absent for a level of values.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub closedness: ::std::option::Option<f64>,
+        ///The numbers used, the method, its accuracy, and warnings.
+        pub diagnostics: Diagnostics,
+        ///Parts that were left out: no point is near them, or they are smaller than six points' worth.
+        pub dropped_parts: ::std::vec::Vec<MeshPart>,
+        ///Standard deviations of the mean curvatures, 1/length.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub mean_curvature_deviations: ::std::vec::Vec<::std::option::Option<f64>>,
+        ///The average of the principal curvatures at each vertex, 1/length.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub mean_curvatures: ::std::vec::Vec<::std::option::Option<f64>>,
+        ///The standard deviation of the angle of the normal at each vertex, radians.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub normal_deviations: ::std::vec::Vec<::std::option::Option<f64>>,
+        ///The normal at each vertex, of length 1.
+        pub normals: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///The connected parts of the mesh, largest first.
+        pub parts: ::std::vec::Vec<MeshPart>,
+        /**The standard deviation of each vertex along its normal, in the unit of the points.
+
+Null where it is not known.*/
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub position_deviations: ::std::vec::Vec<::std::option::Option<f64>>,
+        ///Standard deviations of the principal curvatures at each vertex, 1/length.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub principal_curvature_deviations: ::std::vec::Vec<
+            ::std::option::Option<::std::vec::Vec<f64>>,
+        >,
+        ///The d − 1 principal curvatures at each vertex, ascending, 1/length.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub principal_curvatures: ::std::vec::Vec<
+            ::std::option::Option<::std::vec::Vec<f64>>,
+        >,
+        /**The distance of each vertex from the level, to first order, in the unit of the points.
+
+Null where the function is flat.*/
+        pub residuals: ::std::vec::Vec<::std::option::Option<f64>>,
+        ///What each vertex rests on.
+        pub support: ::std::vec::Vec<VertexSupport>,
+        ///The vertices, one row of coordinates each.
+        pub vertices: ::std::vec::Vec<::std::vec::Vec<f64>>,
+    }
+    impl LevelSetResponse {
+        pub fn builder() -> builder::LevelSetResponse {
+            Default::default()
+        }
+    }
     ///Two regions that have a point in common.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
@@ -1760,6 +1893,150 @@ In Python: `scipy.sparse.csr_matrix((data, indices, indptr), shape)`.*/
         }
     }
     impl ::std::convert::TryFrom<::std::string::String> for MeanChoice {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: ::std::string::String,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            value.parse()
+        }
+    }
+    ///A box that a surface is followed in.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    #[serde(deny_unknown_fields)]
+    pub struct MeshBounds {
+        ///The greatest coordinate along each axis.
+        pub max: ::std::vec::Vec<f64>,
+        ///The least coordinate along each axis.
+        pub min: ::std::vec::Vec<f64>,
+    }
+    impl MeshBounds {
+        pub fn builder() -> builder::MeshBounds {
+            Default::default()
+        }
+    }
+    ///Optional parts of a mesh.
+    #[derive(
+        ::serde::Deserialize,
+        ::serde::Serialize,
+        Clone,
+        Copy,
+        Debug,
+        Eq,
+        Hash,
+        Ord,
+        PartialEq,
+        PartialOrd
+    )]
+    pub enum MeshInclude {
+        #[serde(rename = "curvatures")]
+        Curvatures,
+        #[serde(rename = "deviations")]
+        Deviations,
+    }
+    impl ::std::fmt::Display for MeshInclude {
+        fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
+            match *self {
+                Self::Curvatures => f.write_str("curvatures"),
+                Self::Deviations => f.write_str("deviations"),
+            }
+        }
+    }
+    impl ::std::str::FromStr for MeshInclude {
+        type Err = self::error::ConversionError;
+        fn from_str(
+            value: &str,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            match value {
+                "curvatures" => Ok(Self::Curvatures),
+                "deviations" => Ok(Self::Deviations),
+                _ => Err("invalid value".into()),
+            }
+        }
+    }
+    impl ::std::convert::TryFrom<&str> for MeshInclude {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: &str,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            value.parse()
+        }
+    }
+    impl ::std::convert::TryFrom<::std::string::String> for MeshInclude {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: ::std::string::String,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            value.parse()
+        }
+    }
+    ///A connected part of a mesh.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    pub struct MeshPart {
+        ///The area in the square of the unit of the points, or the length of a curve.
+        pub area: f64,
+        /**Vertices − segments, or vertices − edges + triangles: 0 for a closed curve, 2 for a sphere, 0 for
+a torus.*/
+        pub euler_characteristic: i64,
+        ///Number of edges (in the plane: ends) that belong to a single cell. 0 if the part is closed.
+        pub n_boundary_edges: u64,
+        ///Number of its segments or triangles.
+        pub n_cells: u64,
+        ///Number of its vertices.
+        pub n_vertices: u64,
+    }
+    impl MeshPart {
+        pub fn builder() -> builder::MeshPart {
+            Default::default()
+        }
+    }
+    ///Shape of the triangles.
+    #[derive(
+        ::serde::Deserialize,
+        ::serde::Serialize,
+        Clone,
+        Copy,
+        Debug,
+        Eq,
+        Hash,
+        Ord,
+        PartialEq,
+        PartialOrd
+    )]
+    pub enum MeshQuality {
+        #[serde(rename = "regular")]
+        Regular,
+        #[serde(rename = "raw")]
+        Raw,
+    }
+    impl ::std::fmt::Display for MeshQuality {
+        fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
+            match *self {
+                Self::Regular => f.write_str("regular"),
+                Self::Raw => f.write_str("raw"),
+            }
+        }
+    }
+    impl ::std::str::FromStr for MeshQuality {
+        type Err = self::error::ConversionError;
+        fn from_str(
+            value: &str,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            match value {
+                "regular" => Ok(Self::Regular),
+                "raw" => Ok(Self::Raw),
+                _ => Err("invalid value".into()),
+            }
+        }
+    }
+    impl ::std::convert::TryFrom<&str> for MeshQuality {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: &str,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            value.parse()
+        }
+    }
+    impl ::std::convert::TryFrom<::std::string::String> for MeshQuality {
         type Error = self::error::ConversionError;
         fn try_from(
             value: ::std::string::String,
@@ -1998,6 +2275,8 @@ answer.*/
         ComputeNormals,
         #[serde(rename = "compute_curvatures")]
         ComputeCurvatures,
+        #[serde(rename = "compute_level_set")]
+        ComputeLevelSet,
         #[serde(rename = "compute_surface_gradient")]
         ComputeSurfaceGradient,
         #[serde(rename = "assemble_surface_gradient_matrix")]
@@ -2025,6 +2304,7 @@ answer.*/
                 Self::SelectModel => f.write_str("select_model"),
                 Self::ComputeNormals => f.write_str("compute_normals"),
                 Self::ComputeCurvatures => f.write_str("compute_curvatures"),
+                Self::ComputeLevelSet => f.write_str("compute_level_set"),
                 Self::ComputeSurfaceGradient => f.write_str("compute_surface_gradient"),
                 Self::AssembleSurfaceGradientMatrix => {
                     f.write_str("assemble_surface_gradient_matrix")
@@ -2056,6 +2336,7 @@ answer.*/
                 "select_model" => Ok(Self::SelectModel),
                 "compute_normals" => Ok(Self::ComputeNormals),
                 "compute_curvatures" => Ok(Self::ComputeCurvatures),
+                "compute_level_set" => Ok(Self::ComputeLevelSet),
                 "compute_surface_gradient" => Ok(Self::ComputeSurfaceGradient),
                 "assemble_surface_gradient_matrix" => {
                     Ok(Self::AssembleSurfaceGradientMatrix)
@@ -3360,6 +3641,65 @@ mean. The diagnostics repeat all of it.*/
             Default::default()
         }
     }
+    ///What a vertex rests on.
+    #[derive(
+        ::serde::Deserialize,
+        ::serde::Serialize,
+        Clone,
+        Copy,
+        Debug,
+        Eq,
+        Hash,
+        Ord,
+        PartialEq,
+        PartialOrd
+    )]
+    pub enum VertexSupport {
+        #[serde(rename = "observed")]
+        Observed,
+        #[serde(rename = "bridged")]
+        Bridged,
+        #[serde(rename = "extrapolated")]
+        Extrapolated,
+    }
+    impl ::std::fmt::Display for VertexSupport {
+        fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
+            match *self {
+                Self::Observed => f.write_str("observed"),
+                Self::Bridged => f.write_str("bridged"),
+                Self::Extrapolated => f.write_str("extrapolated"),
+            }
+        }
+    }
+    impl ::std::str::FromStr for VertexSupport {
+        type Err = self::error::ConversionError;
+        fn from_str(
+            value: &str,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            match value {
+                "observed" => Ok(Self::Observed),
+                "bridged" => Ok(Self::Bridged),
+                "extrapolated" => Ok(Self::Extrapolated),
+                _ => Err("invalid value".into()),
+            }
+        }
+    }
+    impl ::std::convert::TryFrom<&str> for VertexSupport {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: &str,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            value.parse()
+        }
+    }
+    impl ::std::convert::TryFrom<::std::string::String> for VertexSupport {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: ::std::string::String,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            value.parse()
+        }
+    }
     ///Something that was changed, or that limits the accuracy of the answer.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct Warning {
@@ -3409,6 +3749,8 @@ mean. The diagnostics repeat all of it.*/
         FarFromCloud,
         #[serde(rename = "neighbours_not_enough")]
         NeighboursNotEnough,
+        #[serde(rename = "raw_mesh")]
+        RawMesh,
         #[serde(rename = "misfit")]
         Misfit,
     }
@@ -3426,6 +3768,7 @@ mean. The diagnostics repeat all of it.*/
                 Self::DisagreesWithNeighbours => f.write_str("disagrees_with_neighbours"),
                 Self::FarFromCloud => f.write_str("far_from_cloud"),
                 Self::NeighboursNotEnough => f.write_str("neighbours_not_enough"),
+                Self::RawMesh => f.write_str("raw_mesh"),
                 Self::Misfit => f.write_str("misfit"),
             }
         }
@@ -3447,6 +3790,7 @@ mean. The diagnostics repeat all of it.*/
                 "disagrees_with_neighbours" => Ok(Self::DisagreesWithNeighbours),
                 "far_from_cloud" => Ok(Self::FarFromCloud),
                 "neighbours_not_enough" => Ok(Self::NeighboursNotEnough),
+                "raw_mesh" => Ok(Self::RawMesh),
                 "misfit" => Ok(Self::Misfit),
                 _ => Err("invalid value".into()),
             }
@@ -8761,6 +9105,691 @@ mean. The diagnostics repeat all of it.*/
             }
         }
         #[derive(Clone, Debug)]
+        pub struct LevelSetRequest {
+            alpha: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
+            bounds: ::std::result::Result<
+                ::std::option::Option<super::MeshBounds>,
+                ::std::string::String,
+            >,
+            cloud: ::std::result::Result<super::CloudRef, ::std::string::String>,
+            duplicates: ::std::result::Result<
+                ::std::option::Option<super::DuplicatePolicy>,
+                ::std::string::String,
+            >,
+            hyperparameters: ::std::result::Result<
+                ::std::option::Option<super::Hyperparameters>,
+                ::std::string::String,
+            >,
+            include: ::std::result::Result<
+                ::std::vec::Vec<super::MeshInclude>,
+                ::std::string::String,
+            >,
+            kernel: ::std::result::Result<
+                ::std::option::Option<super::Kernel>,
+                ::std::string::String,
+            >,
+            level: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
+            mean: ::std::result::Result<
+                ::std::option::Option<super::MeanChoice>,
+                ::std::string::String,
+            >,
+            noise_variances: ::std::result::Result<
+                ::std::vec::Vec<f64>,
+                ::std::string::String,
+            >,
+            open: ::std::result::Result<
+                ::std::option::Option<bool>,
+                ::std::string::String,
+            >,
+            orientation: ::std::result::Result<
+                ::std::option::Option<super::OrientationChoice>,
+                ::std::string::String,
+            >,
+            quality: ::std::result::Result<
+                ::std::option::Option<super::MeshQuality>,
+                ::std::string::String,
+            >,
+            solver: ::std::result::Result<
+                ::std::option::Option<super::SolverChoice>,
+                ::std::string::String,
+            >,
+            step: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
+            surface: ::std::result::Result<
+                ::std::option::Option<super::SurfaceChoice>,
+                ::std::string::String,
+            >,
+            values: ::std::result::Result<::std::vec::Vec<f64>, ::std::string::String>,
+        }
+        impl ::std::default::Default for LevelSetRequest {
+            fn default() -> Self {
+                Self {
+                    alpha: Ok(Default::default()),
+                    bounds: Ok(Default::default()),
+                    cloud: Err("no value supplied for cloud".to_string()),
+                    duplicates: Ok(Default::default()),
+                    hyperparameters: Ok(Default::default()),
+                    include: Ok(Default::default()),
+                    kernel: Ok(Default::default()),
+                    level: Ok(Default::default()),
+                    mean: Ok(Default::default()),
+                    noise_variances: Ok(Default::default()),
+                    open: Ok(Default::default()),
+                    orientation: Ok(Default::default()),
+                    quality: Ok(Default::default()),
+                    solver: Ok(Default::default()),
+                    step: Ok(Default::default()),
+                    surface: Ok(Default::default()),
+                    values: Ok(Default::default()),
+                }
+            }
+        }
+        impl LevelSetRequest {
+            pub fn alpha<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.alpha = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for alpha: {e}")
+                    });
+                self
+            }
+            pub fn bounds<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::MeshBounds>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.bounds = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for bounds: {e}")
+                    });
+                self
+            }
+            pub fn cloud<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::CloudRef>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.cloud = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for cloud: {e}")
+                    });
+                self
+            }
+            pub fn duplicates<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<super::DuplicatePolicy>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.duplicates = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for duplicates: {e}")
+                    });
+                self
+            }
+            pub fn hyperparameters<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<super::Hyperparameters>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.hyperparameters = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for hyperparameters: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn include<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::MeshInclude>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.include = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for include: {e}")
+                    });
+                self
+            }
+            pub fn kernel<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::Kernel>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.kernel = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for kernel: {e}")
+                    });
+                self
+            }
+            pub fn level<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.level = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for level: {e}")
+                    });
+                self
+            }
+            pub fn mean<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::MeanChoice>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.mean = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for mean: {e}")
+                    });
+                self
+            }
+            pub fn noise_variances<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.noise_variances = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for noise_variances: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn open<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<bool>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.open = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for open: {e}")
+                    });
+                self
+            }
+            pub fn orientation<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<super::OrientationChoice>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.orientation = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for orientation: {e}")
+                    });
+                self
+            }
+            pub fn quality<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::MeshQuality>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.quality = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for quality: {e}")
+                    });
+                self
+            }
+            pub fn solver<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::SolverChoice>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.solver = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for solver: {e}")
+                    });
+                self
+            }
+            pub fn step<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.step = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for step: {e}")
+                    });
+                self
+            }
+            pub fn surface<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::SurfaceChoice>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.surface = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for surface: {e}")
+                    });
+                self
+            }
+            pub fn values<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.values = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for values: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<LevelSetRequest> for super::LevelSetRequest {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: LevelSetRequest,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    alpha: value.alpha?,
+                    bounds: value.bounds?,
+                    cloud: value.cloud?,
+                    duplicates: value.duplicates?,
+                    hyperparameters: value.hyperparameters?,
+                    include: value.include?,
+                    kernel: value.kernel?,
+                    level: value.level?,
+                    mean: value.mean?,
+                    noise_variances: value.noise_variances?,
+                    open: value.open?,
+                    orientation: value.orientation?,
+                    quality: value.quality?,
+                    solver: value.solver?,
+                    step: value.step?,
+                    surface: value.surface?,
+                    values: value.values?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::LevelSetRequest> for LevelSetRequest {
+            fn from(value: super::LevelSetRequest) -> Self {
+                Self {
+                    alpha: Ok(value.alpha),
+                    bounds: Ok(value.bounds),
+                    cloud: Ok(value.cloud),
+                    duplicates: Ok(value.duplicates),
+                    hyperparameters: Ok(value.hyperparameters),
+                    include: Ok(value.include),
+                    kernel: Ok(value.kernel),
+                    level: Ok(value.level),
+                    mean: Ok(value.mean),
+                    noise_variances: Ok(value.noise_variances),
+                    open: Ok(value.open),
+                    orientation: Ok(value.orientation),
+                    quality: Ok(value.quality),
+                    solver: Ok(value.solver),
+                    step: Ok(value.step),
+                    surface: Ok(value.surface),
+                    values: Ok(value.values),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct LevelSetResponse {
+            cells: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<u64>>,
+                ::std::string::String,
+            >,
+            closedness: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
+            diagnostics: ::std::result::Result<
+                super::Diagnostics,
+                ::std::string::String,
+            >,
+            dropped_parts: ::std::result::Result<
+                ::std::vec::Vec<super::MeshPart>,
+                ::std::string::String,
+            >,
+            mean_curvature_deviations: ::std::result::Result<
+                ::std::vec::Vec<::std::option::Option<f64>>,
+                ::std::string::String,
+            >,
+            mean_curvatures: ::std::result::Result<
+                ::std::vec::Vec<::std::option::Option<f64>>,
+                ::std::string::String,
+            >,
+            normal_deviations: ::std::result::Result<
+                ::std::vec::Vec<::std::option::Option<f64>>,
+                ::std::string::String,
+            >,
+            normals: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
+            parts: ::std::result::Result<
+                ::std::vec::Vec<super::MeshPart>,
+                ::std::string::String,
+            >,
+            position_deviations: ::std::result::Result<
+                ::std::vec::Vec<::std::option::Option<f64>>,
+                ::std::string::String,
+            >,
+            principal_curvature_deviations: ::std::result::Result<
+                ::std::vec::Vec<::std::option::Option<::std::vec::Vec<f64>>>,
+                ::std::string::String,
+            >,
+            principal_curvatures: ::std::result::Result<
+                ::std::vec::Vec<::std::option::Option<::std::vec::Vec<f64>>>,
+                ::std::string::String,
+            >,
+            residuals: ::std::result::Result<
+                ::std::vec::Vec<::std::option::Option<f64>>,
+                ::std::string::String,
+            >,
+            support: ::std::result::Result<
+                ::std::vec::Vec<super::VertexSupport>,
+                ::std::string::String,
+            >,
+            vertices: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
+        }
+        impl ::std::default::Default for LevelSetResponse {
+            fn default() -> Self {
+                Self {
+                    cells: Err("no value supplied for cells".to_string()),
+                    closedness: Ok(Default::default()),
+                    diagnostics: Err("no value supplied for diagnostics".to_string()),
+                    dropped_parts: Err(
+                        "no value supplied for dropped_parts".to_string(),
+                    ),
+                    mean_curvature_deviations: Ok(Default::default()),
+                    mean_curvatures: Ok(Default::default()),
+                    normal_deviations: Ok(Default::default()),
+                    normals: Err("no value supplied for normals".to_string()),
+                    parts: Err("no value supplied for parts".to_string()),
+                    position_deviations: Ok(Default::default()),
+                    principal_curvature_deviations: Ok(Default::default()),
+                    principal_curvatures: Ok(Default::default()),
+                    residuals: Err("no value supplied for residuals".to_string()),
+                    support: Err("no value supplied for support".to_string()),
+                    vertices: Err("no value supplied for vertices".to_string()),
+                }
+            }
+        }
+        impl LevelSetResponse {
+            pub fn cells<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<u64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.cells = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for cells: {e}")
+                    });
+                self
+            }
+            pub fn closedness<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.closedness = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for closedness: {e}")
+                    });
+                self
+            }
+            pub fn diagnostics<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::Diagnostics>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.diagnostics = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for diagnostics: {e}")
+                    });
+                self
+            }
+            pub fn dropped_parts<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::MeshPart>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.dropped_parts = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for dropped_parts: {e}")
+                    });
+                self
+            }
+            pub fn mean_curvature_deviations<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::option::Option<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.mean_curvature_deviations = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for mean_curvature_deviations: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn mean_curvatures<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::option::Option<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.mean_curvatures = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for mean_curvatures: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn normal_deviations<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::option::Option<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.normal_deviations = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for normal_deviations: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn normals<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.normals = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for normals: {e}")
+                    });
+                self
+            }
+            pub fn parts<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::MeshPart>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.parts = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for parts: {e}")
+                    });
+                self
+            }
+            pub fn position_deviations<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::option::Option<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.position_deviations = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for position_deviations: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn principal_curvature_deviations<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::vec::Vec<::std::option::Option<::std::vec::Vec<f64>>>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.principal_curvature_deviations = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for principal_curvature_deviations: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn principal_curvatures<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::vec::Vec<::std::option::Option<::std::vec::Vec<f64>>>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.principal_curvatures = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for principal_curvatures: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn residuals<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::option::Option<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.residuals = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for residuals: {e}")
+                    });
+                self
+            }
+            pub fn support<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::VertexSupport>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.support = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for support: {e}")
+                    });
+                self
+            }
+            pub fn vertices<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.vertices = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for vertices: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<LevelSetResponse> for super::LevelSetResponse {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: LevelSetResponse,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    cells: value.cells?,
+                    closedness: value.closedness?,
+                    diagnostics: value.diagnostics?,
+                    dropped_parts: value.dropped_parts?,
+                    mean_curvature_deviations: value.mean_curvature_deviations?,
+                    mean_curvatures: value.mean_curvatures?,
+                    normal_deviations: value.normal_deviations?,
+                    normals: value.normals?,
+                    parts: value.parts?,
+                    position_deviations: value.position_deviations?,
+                    principal_curvature_deviations: value
+                        .principal_curvature_deviations?,
+                    principal_curvatures: value.principal_curvatures?,
+                    residuals: value.residuals?,
+                    support: value.support?,
+                    vertices: value.vertices?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::LevelSetResponse> for LevelSetResponse {
+            fn from(value: super::LevelSetResponse) -> Self {
+                Self {
+                    cells: Ok(value.cells),
+                    closedness: Ok(value.closedness),
+                    diagnostics: Ok(value.diagnostics),
+                    dropped_parts: Ok(value.dropped_parts),
+                    mean_curvature_deviations: Ok(value.mean_curvature_deviations),
+                    mean_curvatures: Ok(value.mean_curvatures),
+                    normal_deviations: Ok(value.normal_deviations),
+                    normals: Ok(value.normals),
+                    parts: Ok(value.parts),
+                    position_deviations: Ok(value.position_deviations),
+                    principal_curvature_deviations: Ok(
+                        value.principal_curvature_deviations,
+                    ),
+                    principal_curvatures: Ok(value.principal_curvatures),
+                    residuals: Ok(value.residuals),
+                    support: Ok(value.support),
+                    vertices: Ok(value.vertices),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
         pub struct Link {
             first: ::std::result::Result<u64, ::std::string::String>,
             second: ::std::result::Result<u64, ::std::string::String>,
@@ -8815,6 +9844,178 @@ mean. The diagnostics repeat all of it.*/
                 Self {
                     first: Ok(value.first),
                     second: Ok(value.second),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct MeshBounds {
+            max: ::std::result::Result<::std::vec::Vec<f64>, ::std::string::String>,
+            min: ::std::result::Result<::std::vec::Vec<f64>, ::std::string::String>,
+        }
+        impl ::std::default::Default for MeshBounds {
+            fn default() -> Self {
+                Self {
+                    max: Err("no value supplied for max".to_string()),
+                    min: Err("no value supplied for min".to_string()),
+                }
+            }
+        }
+        impl MeshBounds {
+            pub fn max<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.max = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for max: {e}")
+                    });
+                self
+            }
+            pub fn min<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.min = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for min: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<MeshBounds> for super::MeshBounds {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: MeshBounds,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    max: value.max?,
+                    min: value.min?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::MeshBounds> for MeshBounds {
+            fn from(value: super::MeshBounds) -> Self {
+                Self {
+                    max: Ok(value.max),
+                    min: Ok(value.min),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct MeshPart {
+            area: ::std::result::Result<f64, ::std::string::String>,
+            euler_characteristic: ::std::result::Result<i64, ::std::string::String>,
+            n_boundary_edges: ::std::result::Result<u64, ::std::string::String>,
+            n_cells: ::std::result::Result<u64, ::std::string::String>,
+            n_vertices: ::std::result::Result<u64, ::std::string::String>,
+        }
+        impl ::std::default::Default for MeshPart {
+            fn default() -> Self {
+                Self {
+                    area: Err("no value supplied for area".to_string()),
+                    euler_characteristic: Err(
+                        "no value supplied for euler_characteristic".to_string(),
+                    ),
+                    n_boundary_edges: Err(
+                        "no value supplied for n_boundary_edges".to_string(),
+                    ),
+                    n_cells: Err("no value supplied for n_cells".to_string()),
+                    n_vertices: Err("no value supplied for n_vertices".to_string()),
+                }
+            }
+        }
+        impl MeshPart {
+            pub fn area<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<f64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.area = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for area: {e}")
+                    });
+                self
+            }
+            pub fn euler_characteristic<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<i64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.euler_characteristic = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for euler_characteristic: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn n_boundary_edges<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<u64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.n_boundary_edges = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for n_boundary_edges: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn n_cells<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<u64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.n_cells = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for n_cells: {e}")
+                    });
+                self
+            }
+            pub fn n_vertices<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<u64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.n_vertices = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for n_vertices: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<MeshPart> for super::MeshPart {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: MeshPart,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    area: value.area?,
+                    euler_characteristic: value.euler_characteristic?,
+                    n_boundary_edges: value.n_boundary_edges?,
+                    n_cells: value.n_cells?,
+                    n_vertices: value.n_vertices?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::MeshPart> for MeshPart {
+            fn from(value: super::MeshPart) -> Self {
+                Self {
+                    area: Ok(value.area),
+                    euler_characteristic: Ok(value.euler_characteristic),
+                    n_boundary_edges: Ok(value.n_boundary_edges),
+                    n_cells: Ok(value.n_cells),
+                    n_vertices: Ok(value.n_vertices),
                 }
             }
         }
@@ -13683,6 +14884,26 @@ let response = client.compute_normals()
     pub fn compute_normals(&self) -> builder::ComputeNormals<'_> {
         builder::ComputeNormals::new(self)
     }
+    /**Mesh a surface
+
+Returns the level set of a function as closed polylines (in the plane) or as a triangle mesh (in
+space), followed from the points of the cloud on a lattice with edges of `step`. The mesh is a
+manifold, and closed wherever `bounds` does not cut it. Without `values` it is the surface that the
+cloud samples: the level of its signature function, or for large clouds that of local regressions,
+closed by winding numbers where the cloud has holes. Each vertex says what it rests on. With
+`include`, vertices have curvatures and error bars.
+
+Sends a `POST` request to `/v1/level-set`
+
+```ignore
+let response = client.compute_level_set()
+    .body(body)
+    .send()
+    .await;
+```*/
+    pub fn compute_level_set(&self) -> builder::ComputeLevelSet<'_> {
+        builder::ComputeLevelSet::new(self)
+    }
     /**Compute curvatures
 
 Returns principal curvatures with their directions, mean curvatures and Gaussian curvatures. Principal
@@ -16486,6 +17707,172 @@ pub mod builder {
                 .build()?;
             let info = OperationInfo {
                 operation_id: "compute_normals",
+            };
+            client.pre(&mut request, &info).await?;
+            let result = client.exec(request, &info).await;
+            client.post(&result, &info).await?;
+            let response = result?;
+            match response.status().as_u16() {
+                200u16 => ResponseValue::from_response(response).await,
+                400u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                401u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                404u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                406u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                408u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                413u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                415u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                422u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                429u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                500u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                503u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                504u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                _ => Err(Error::UnexpectedResponse(response)),
+            }
+        }
+    }
+    /**Builder for [`Client::compute_level_set`]
+
+[`Client::compute_level_set`]: super::Client::compute_level_set*/
+    #[derive(Debug, Clone)]
+    pub struct ComputeLevelSet<'a> {
+        client: &'a super::Client,
+        body: Result<types::builder::LevelSetRequest, String>,
+    }
+    impl<'a> ComputeLevelSet<'a> {
+        pub fn new(client: &'a super::Client) -> Self {
+            Self {
+                client: client,
+                body: Ok(::std::default::Default::default()),
+            }
+        }
+        pub fn body<V>(mut self, value: V) -> Self
+        where
+            V: std::convert::TryInto<types::LevelSetRequest>,
+            <V as std::convert::TryInto<
+                types::LevelSetRequest,
+            >>::Error: std::fmt::Display,
+        {
+            self.body = value
+                .try_into()
+                .map(From::from)
+                .map_err(|s| {
+                    format!("conversion to `LevelSetRequest` for body failed: {}", s)
+                });
+            self
+        }
+        pub fn body_map<F>(mut self, f: F) -> Self
+        where
+            F: std::ops::FnOnce(
+                types::builder::LevelSetRequest,
+            ) -> types::builder::LevelSetRequest,
+        {
+            self.body = self.body.map(f);
+            self
+        }
+        ///Sends a `POST` request to `/v1/level-set`
+        pub async fn send(
+            self,
+        ) -> Result<ResponseValue<types::LevelSetResponse>, Error<types::Problem>> {
+            let Self { client, body } = self;
+            let body = body
+                .and_then(|v| {
+                    types::LevelSetRequest::try_from(v).map_err(|e| e.to_string())
+                })
+                .map_err(Error::InvalidRequest)?;
+            let url = format!("{}/v1/level-set", client.baseurl,);
+            let mut header_map = ::reqwest::header::HeaderMap::with_capacity(1usize);
+            header_map
+                .append(
+                    ::reqwest::header::HeaderName::from_static("api-version"),
+                    ::reqwest::header::HeaderValue::from_static(
+                        super::Client::api_version(),
+                    ),
+                );
+            #[allow(unused_mut)]
+            let mut request = client
+                .client
+                .post(url)
+                .header(
+                    ::reqwest::header::ACCEPT,
+                    ::reqwest::header::HeaderValue::from_static("application/json"),
+                )
+                .json(&body)
+                .headers(header_map)
+                .build()?;
+            let info = OperationInfo {
+                operation_id: "compute_level_set",
             };
             client.pre(&mut request, &info).await?;
             let result = client.exec(request, &info).await;

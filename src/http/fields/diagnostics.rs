@@ -86,6 +86,8 @@ pub enum WarningCode {
     FarFromCloud,
     /// Values from the points nearest to a query still change with the number of points used.
     NeighboursNotEnough,
+    /// Regular triangles would have changed the topology of a mesh, so it has the raw ones.
+    RawMesh,
     /// Values contradict kernel and noise, so deviations are too short. If the warning names a value, perhaps
     /// only around it.
     Misfit,

@@ -38,6 +38,7 @@ pub const EXAMPLES: [(&str, &str); 27] = [
     example_file!("choose_sides"),
     example_file!("compute_normals"),
     example_file!("compute_curvatures"),
+    example_file!("compute_level_set"),
     example_file!("compute_surface_gradient"),
     example_file!("assemble_surface_gradient_matrix"),
     example_file!("assemble_surface_gradient_sparse_matrix"),
@@ -47,7 +48,6 @@ pub const EXAMPLES: [(&str, &str); 27] = [
     example_file!("check_live"),
     example_file!("check_ready"),
     example_file!("get_version"),
-    example_file!("get_start_page"),
     example_file!("list_problem_pages"),
     example_file!("get_problem_page"),
 ];

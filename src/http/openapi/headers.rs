@@ -34,7 +34,7 @@ const HEADERS: [(&str, &str, &str); 8] = [
          server that holds its factorizations. An id sent in this header or in the path is repeated, in refusals too.",
     ),
     ("Location", "/v1/clouds/…", "The path of the cloud."),
-    ("ETag", "W/\"…\"", "The id of the cloud in quotes, weak; for If-None-Match."),
+    ("ETag", "W/\"…\"", "What was answered, weak: of a cloud its id in quotes. For If-None-Match."),
     ("Retry-After", "1", "Seconds after which to try again."),
     ("WWW-Authenticate", "Bearer", "How to authenticate: a bearer key."),
 ];
@@ -60,6 +60,7 @@ fn names_on_success(operation: &Operation) -> Vec<&'static str> {
     match id_of(operation) {
         "create_cloud" => vec!["Location", "Gramian-Cloud"],
         "get_cloud" | "check_cloud" => vec!["ETag", "Gramian-Cloud"],
+        "get_start_page" => vec!["ETag"],
         "get_job_result" => vec!["Server-Timing", "Cache-Status", "Gramian-Cloud"],
         _ if is_computed(operation) => vec!["Server-Timing", "Cache-Status", "Gramian-Cloud"],
         _ => vec![],

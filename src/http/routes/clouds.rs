@@ -21,7 +21,8 @@ use crate::http::serve::intake::read_body;
 use crate::http::serve::planner::{Planner, unknown_cloud};
 use crate::http::serve::sampling::find_sampling;
 use crate::http::state::app::App;
-use crate::http::wire::negotiation::Format;
+use crate::http::wire::etag::is_known;
+use crate::http::wire::negotiation::BodyFormat;
 use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::json::{Json, timestamp};
@@ -163,7 +164,7 @@ pub async fn create_cloud(
     request: Request,
 ) -> Result<Response, Problem> {
     let (parts, body) = request.into_parts();
-    let formats = [Format::Json, Format::Safetensors, Format::Npy, Format::Ply];
+    let formats = [BodyFormat::Json, BodyFormat::Safetensors, BodyFormat::Npy, BodyFormat::Ply];
     let intake = read_body(&app, owner, &parts.headers, body, &formats).await?;
     let admission = app.compute.admit(owner)?;
     let (shared, flops) = (app.clone(), intake.body.flops_to_parse());
@@ -377,14 +378,4 @@ async fn find(
     let unknown = || unknown_cloud(cloud_id);
     let id = CloudId::parse(cloud_id).ok_or_else(unknown)?;
     find_cloud(app, admission, id).await?.ok_or_else(unknown)
-}
-
-/// Returns whether `If-None-Match` has the tag.
-///
-/// The header is a list of tags, weak or strong, or `*` (RFC 9110, section 13.1.2).
-fn is_known(headers: &HeaderMap, etag: &str) -> bool {
-    let opaque = |tag: &str| tag.strip_prefix("W/").unwrap_or(tag).to_owned();
-    let lines = headers.get_all(header::IF_NONE_MATCH).iter().filter_map(|value| value.to_str().ok());
-    let mut tags = lines.flat_map(|line| line.split(',')).map(str::trim);
-    tags.any(|tag| tag == "*" || opaque(tag) == opaque(etag))
 }

@@ -14,6 +14,7 @@ use super::surface::curvatures::CurvaturesRequest;
 use super::surface::laplace_beltrami::{
     LaplaceBeltramiMatrixRequest, LaplaceBeltramiRequest, LaplaceBeltramiSparseMatrixRequest,
 };
+use super::surface::level_set::LevelSetRequest;
 use super::surface::normals::NormalsRequest;
 use super::surface::surface_gradient::{
     SurfaceGradientMatrixRequest, SurfaceGradientRequest, SurfaceGradientSparseMatrixRequest,
@@ -178,6 +179,7 @@ operations!(
     ModelSelectionRequest,
     NormalsRequest,
     CurvaturesRequest,
+    LevelSetRequest,
     SurfaceGradientRequest,
     SurfaceGradientMatrixRequest,
     SurfaceGradientSparseMatrixRequest,

@@ -2,7 +2,7 @@
 
 use super::estimate;
 use crate::http::problem::Problem;
-use crate::http::wire::negotiation::{Coding, Format};
+use crate::http::wire::negotiation::{BodyFormat, Coding};
 use crate::http::wire::read::body::RequestBody;
 use crate::http::wire::read::limits::ParseContext;
 use gramian_numerics::observer::Unobserved;
@@ -20,7 +20,7 @@ const CONTEXT: ParseContext<'static> =
 ///
 /// # Errors
 /// Returns the problem that the request would be refused with.
-pub fn read_as(operation: &str, format: Format, coding: Coding, bytes: &[u8]) -> Result<(), Problem> {
+pub fn read_as(operation: &str, format: BodyFormat, coding: Coding, bytes: &[u8]) -> Result<(), Problem> {
     let body = RequestBody::new(format, coding, bytes.to_vec(), LIMIT).unpack(&CONTEXT, |_| Ok(()))?;
     estimate::read_as(operation, &body, &CONTEXT)
 }

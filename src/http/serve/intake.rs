@@ -12,7 +12,7 @@ use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::http::state::app::App;
 use crate::http::wire::compression::SMALLER_BODY;
-use crate::http::wire::negotiation::{Format, announced};
+use crate::http::wire::negotiation::{BodyFormat, announced};
 use crate::http::wire::read::body::{RequestBody, UnpackedBody};
 use crate::http::wire::read::limits::ParseContext;
 use crate::store::Owner;
@@ -85,7 +85,7 @@ pub async fn read_body(
     owner: Owner,
     headers: &HeaderMap,
     body: Body,
-    formats: &[Format],
+    formats: &[BodyFormat],
 ) -> Result<ReceivedBody, Problem> {
     let (format, coding) = announced(headers, formats)?;
     let (bytes, mut memory) = read_bytes(app, owner, headers, body).await?;

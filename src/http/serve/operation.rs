@@ -14,7 +14,7 @@ use super::durable::{TRUST, find_cloud, keep_all};
 use super::fitted::Fits;
 use super::fitting::{Fitting, Outlook};
 use super::intake::{ReceivedBody, read_body};
-use super::plan::{Cost, FitPlan, PlannedFit};
+use super::plan::{Cost, FitPlan, PlannedFit, PlannedSurface, PlannedValues};
 use super::planner::Planner;
 use super::report::AnswerHeaders;
 use super::sampling::find_lacking;
@@ -24,7 +24,7 @@ use crate::http::fields::HasCloud;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::http::state::app::App;
-use crate::http::wire::negotiation::{Format, Wanted};
+use crate::http::wire::negotiation::{BodyFormat, Format, Wanted};
 use crate::http::wire::read::without::WithOperation;
 use crate::http::wire::write::answer::Answer;
 use crate::http::wire::write::encode::Encoded;
@@ -50,9 +50,6 @@ pub trait Operation: Declared + HasCloud + DeserializeOwned + Send + 'static {
     /// Formats of answers, the preferred one first. Answers of one matrix also have npy.
     const FORMATS: &'static [Format] = &[Format::Json, Format::Safetensors];
 
-    /// Whether the operation needs a surface: that of the plan's `surface`, or else of its `main` fit.
-    const HAS_SURFACE: bool = false;
-
     /// Checks everything that can be checked without computing, the cost included.
     ///
     /// # Errors
@@ -67,7 +64,7 @@ pub trait Operation: Declared + HasCloud + DeserializeOwned + Send + 'static {
 }
 
 /// Formats of compute requests.
-pub const REQUEST_FORMATS: [Format; 2] = [Format::Json, Format::Safetensors];
+pub const REQUEST_FORMATS: [BodyFormat; 2] = [BodyFormat::Json, BodyFormat::Safetensors];
 
 /// Fits that an operation needs, the work on them, and its cost.
 pub struct Plan<W> {
@@ -75,14 +72,34 @@ pub struct Plan<W> {
     pub main: PlannedFit,
     /// Fit of the surface, if the operation needs both values and a surface.
     pub surface: Option<PlannedFit>,
+    /// Whether the work needs a surface: that of the `surface` fit, or else of the `main` fit.
+    pub has_surface: bool,
     pub work: W,
     pub cost: Cost,
+}
+
+impl<W> Plan<W> {
+    /// A plan for values alone.
+    pub fn of_values(values: PlannedValues, work: W, cost: Cost) -> Self {
+        Self { main: values.into(), surface: None, has_surface: false, work, cost }
+    }
+
+    /// A plan for the surface of a cloud.
+    pub fn of_surface(surface: PlannedSurface, work: W, cost: Cost) -> Self {
+        Self { main: surface.into(), surface: None, has_surface: true, work, cost }
+    }
+
+    /// A plan for values on a surface.
+    pub fn on_surface(values: PlannedValues, surface: PlannedSurface, work: W, cost: Cost) -> Self {
+        Self { main: values.into(), surface: Some(surface.into()), has_surface: true, work, cost }
+    }
 }
 
 /// A plan whose fits are complete.
 pub struct Resolved<W> {
     pub main: FitPlan,
     pub surface: Option<FitPlan>,
+    has_surface: bool,
     work: W,
     pub cost: Cost,
     /// Memory of the parsed request, for as long as it is held.
@@ -126,7 +143,7 @@ async fn compute<O: Operation>(
 ) -> Result<Answered, Problem> {
     let (app, admission) = (&call.app, &call.admission);
     let mut report = AnswerHeaders::parsed_in(call.began.elapsed(), plan.main.stored.id);
-    let fitting = Fitting { app, admission, has_surface: O::HAS_SURFACE };
+    let fitting = Fitting { app, admission, has_surface: plan.has_surface };
     let outlook = fitting.outlook(&plan.main, plan.surface.as_ref(), plan.cost);
     within_deadline(app, admission, admission.set_work(outlook.as_work(O::NAME)))?;
     let (fits, memory) = fitting.fits(&plan.main, plan.surface.as_ref(), plan.cost, &mut report).await?;
@@ -184,7 +201,7 @@ pub async fn estimate<O: Operation>(
         return Err(Problem::internal());
     };
     keep_all(app, admission.owner, &plan.fresh).await;
-    let fitting = Fitting { app, admission, has_surface: O::HAS_SURFACE };
+    let fitting = Fitting { app, admission, has_surface: plan.has_surface };
     let outlook = fitting.outlook(&plan.main, plan.surface.as_ref(), plan.cost);
     let seconds = admission.expected_seconds(outlook.as_work(O::NAME));
     let has_memory = outlook.n_bytes <= app.prepared.memory();
@@ -304,7 +321,7 @@ fn planned<O: Operation>(
     }
     let plan = resolve(plan, memory, fresh)?;
     let mut report = AnswerHeaders::parsed_in(began.elapsed(), plan.main.stored.id);
-    let fitting = Fitting { app, admission, has_surface: O::HAS_SURFACE };
+    let fitting = Fitting { app, admission, has_surface: plan.has_surface };
     let wanted = wanted.filter(|_| is_light(plan.cost.work.flops));
     let at_hand = wanted.and_then(|wanted| {
         let found = fitting.at_hand(&plan.main, plan.surface.as_ref(), plan.cost, &mut report)?;
@@ -368,7 +385,8 @@ fn resolve<W>(
 ) -> Result<Resolved<W>, Problem> {
     let main = plan.main.resolve()?;
     let surface = plan.surface.map(PlannedFit::resolve).transpose()?;
-    Ok(Resolved { main, surface, work: plan.work, cost: plan.cost, intake, fresh })
+    let Plan { has_surface, work, cost, .. } = plan;
+    Ok(Resolved { main, surface, has_surface, work, cost, intake, fresh })
 }
 
 /// Bytes that a request holds until it is answered: values, queries, and clouds that the cache may drop.

@@ -5,9 +5,9 @@ use axum::http::{HeaderMap, HeaderName, header};
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 
-/// Media type of a body.
+/// Media type of a request body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Format {
+pub enum BodyFormat {
     Json,
     /// Tensors named like the arrays of the JSON. Everything else is JSON text in the metadata.
     Safetensors,
@@ -17,6 +17,33 @@ pub enum Format {
     Ply,
 }
 
+impl BodyFormat {
+    pub const fn media_type(self) -> &'static str {
+        match self {
+            Self::Json => Format::Json.media_type(),
+            Self::Safetensors => Format::Safetensors.media_type(),
+            Self::Npy => Format::Npy.media_type(),
+            Self::Ply => Format::Ply.media_type(),
+        }
+    }
+}
+
+/// Media type of an answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    Json,
+    /// Tensors named like the arrays of the JSON. Everything else is JSON text in the metadata.
+    Safetensors,
+    /// A single `NumPy` array.
+    Npy,
+    /// Points or a mesh, with quantities as properties.
+    Ply,
+    /// Points or a mesh as binary glTF.
+    Gltf,
+    /// A mesh as Wavefront OBJ, text.
+    Obj,
+}
+
 impl Format {
     pub const fn media_type(self) -> &'static str {
         match self {
@@ -24,6 +51,8 @@ impl Format {
             Self::Safetensors => "application/x-safetensors",
             Self::Npy => "application/x-npy",
             Self::Ply => "model/ply",
+            Self::Gltf => "model/gltf-binary",
+            Self::Obj => "model/obj",
         }
     }
 }
@@ -64,6 +93,11 @@ impl Wanted {
     }
 }
 
+/// Chooses the coding of a text from `Accept-Encoding`.
+pub fn accepted_text_coding(headers: &HeaderMap) -> Coding {
+    accepted_coding(headers, Format::Json)
+}
+
 /// Chooses the format of the answer from `Accept` (RFC 9110, section 12.5.1).
 ///
 /// The most specific range that matches a format gives its weight. The greatest weight wins. On a tie, the
@@ -76,7 +110,8 @@ fn accepted_format(headers: &HeaderMap, offered: &[Format]) -> Result<Format, Pr
     for &format in offered {
         let specificity = |range: &str| match range {
             name if name == format.media_type() => Some(2),
-            "application/*" => Some(1),
+            "application/*" if format.media_type().starts_with("application/") => Some(1),
+            "model/*" if format.media_type().starts_with("model/") => Some(1),
             "*/*" => Some(0),
             _ => None,
         };
@@ -90,7 +125,10 @@ fn accepted_format(headers: &HeaderMap, offered: &[Format]) -> Result<Format, Pr
         }
     }
     best.map(|(format, _)| format).ok_or_else(|| {
-        let detail = format!("answers come as {}; add one of them to Accept", names(offered));
+        let detail = format!(
+            "answers come as {}; add one of them to Accept",
+            names(offered.iter().map(|format| format.media_type()))
+        );
         Problem::new(Slug::NotAcceptable, detail)
     })
 }
@@ -107,11 +145,12 @@ fn accepted_coding(headers: &HeaderMap, format: Format) -> Coding {
     let identity = match (given("identity"), given("*"), format) {
         (Some((_, weight)), ..) => weight,
         (None, Some((_, 0.0)), _) => 0.0,
-        (None, _, Format::Json) => f64::MIN_POSITIVE,
-        (None, _, Format::Safetensors | Format::Npy | Format::Ply) => 1.0,
+        (None, _, Format::Json | Format::Obj) => f64::MIN_POSITIVE,
+        (None, _, Format::Safetensors | Format::Npy | Format::Ply | Format::Gltf) => 1.0,
     };
     let codings = [(Coding::Zstd, weight("zstd")), (Coding::Gzip, weight("gzip"))];
-    let first = if format == Format::Json { None } else { Some((Coding::Identity, identity)) };
+    let first =
+        if matches!(format, Format::Json | Format::Obj) { None } else { Some((Coding::Identity, identity)) };
     let ranked = first.into_iter().chain(codings).chain([(Coding::Identity, identity)]);
     let best = ranked.filter(|(_, weight)| *weight > 0.0).reduce(|a, b| if b.1 > a.1 { b } else { a });
     best.map_or(Coding::Identity, |(coding, _)| coding)
@@ -121,13 +160,16 @@ fn accepted_coding(headers: &HeaderMap, format: Format) -> Coding {
 ///
 /// # Errors
 /// 415 `unsupported-media-type` for a media type not in `formats`, or a coding other than gzip and zstd.
-pub fn announced(headers: &HeaderMap, formats: &[Format]) -> Result<(Format, Coding), Problem> {
+pub fn announced(headers: &HeaderMap, formats: &[BodyFormat]) -> Result<(BodyFormat, Coding), Problem> {
     let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
     let essence = text(header::CONTENT_TYPE).and_then(|value| value.split(';').next()).unwrap_or("").trim();
     let format = formats.iter().find(|format| essence.eq_ignore_ascii_case(format.media_type()));
     let format = *format.ok_or_else(|| {
         let found = if essence.is_empty() { "no Content-Type" } else { essence };
-        let detail = format!("expected Content-Type: {}, found {found:?}", names(formats));
+        let detail = format!(
+            "expected Content-Type: {}, found {found:?}",
+            names(formats.iter().map(|format| format.media_type()))
+        );
         Problem::new(Slug::UnsupportedMediaType, detail)
     })?;
     let coding = text(header::CONTENT_ENCODING).unwrap_or("identity").trim();
@@ -157,8 +199,8 @@ fn weights(list: &str) -> impl Iterator<Item = (String, f64)> {
     })
 }
 
-fn names(formats: &[Format]) -> String {
-    formats.iter().map(|format| format.media_type()).collect::<Vec<_>>().join(" or ")
+fn names<'a>(media_types: impl Iterator<Item = &'a str>) -> String {
+    media_types.collect::<Vec<_>>().join(" or ")
 }
 
 #[cfg(test)]

@@ -43,7 +43,7 @@ pub fn plan_geometry(
     let sizes = Sizes { n_points: main.on.n_points(), n_queries: m, dimension: d };
     let work = geometry_price(main.solver(), asked_of(&request, &main, &queries), sizes);
     let cost = Cost { work, n_numbers, n_held: m * d };
-    Ok(Plan { main: main.into(), surface: None, work: GeometryWork { queries, request }, cost })
+    Ok(Plan::of_surface(main, GeometryWork { queries, request }, cost))
 }
 
 /// Translates the options of a request into options of the numerics, with defaults for absent ones.

@@ -10,9 +10,11 @@ use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::planner::Planner;
+use crate::http::wire::negotiation::Format;
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
+use crate::http::wire::write::model::Shape;
 use gramian_numerics::kernel::defaults::Purpose;
 
 request! {
@@ -69,6 +71,9 @@ answer! {
         degenerate: Vec<Degenerate>,
         /// The numbers used, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
+        /// The queries, for model/ply.
+        #[schema(ignore)]
+        shape: Shape,
     }
 }
 
@@ -87,7 +92,7 @@ path: "/v1/curvatures", tag: "geometry", answer: "Curvatures at the queries"
 
 impl Operation for CurvaturesRequest {
     type Work = GeometryWork;
-    const HAS_SURFACE: bool = true;
+    const FORMATS: &[Format] = &[Format::Json, Format::Safetensors, Format::Ply];
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<GeometryWork>, Problem> {
         let fit = self.take_fit();
@@ -125,6 +130,7 @@ impl Operation for CurvaturesRequest {
             mean_curvature_deviations: mean,
             gaussian_curvature_deviations: gaussian,
             diagnostics: surface.diagnostics(fits),
+            shape: Shape::of_points(work.queries),
         })
     }
 }

@@ -121,7 +121,6 @@ path: "/v1/laplace-beltrami/matrix", tag: "operators", answer: "The matrix"
 
 impl Operation for LaplaceBeltramiRequest {
     type Work = AppliedWork;
-    const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<AppliedWork>, Problem> {
         let values = std::mem::take(&mut self.values);
@@ -144,7 +143,6 @@ impl Operation for LaplaceBeltramiRequest {
 
 impl Operation for LaplaceBeltramiMatrixRequest {
     type Work = MatrixWork;
-    const HAS_SURFACE: bool = true;
     const FORMATS: &[Format] = &[Format::Json, Format::Safetensors, Format::Npy];
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<MatrixWork>, Problem> {
@@ -210,7 +208,6 @@ path: "/v1/laplace-beltrami/sparse-matrix", tag: "operators", answer: "The matri
 
 impl Operation for LaplaceBeltramiSparseMatrixRequest {
     type Work = StencilWork;
-    const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<StencilWork>, Problem> {
         let fit = self.take_fit();

@@ -4,6 +4,7 @@ mod common;
 pub mod curvatures;
 mod doubts;
 pub mod laplace_beltrami;
+pub mod level_set;
 pub mod normals;
 mod operator;
 pub mod surface_gradient;

@@ -10,10 +10,12 @@ use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::planner::Planner;
+use crate::http::wire::negotiation::Format;
 use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
+use crate::http::wire::write::model::Shape;
 use gramian_numerics::kernel::defaults::Purpose;
 
 request! {
@@ -59,6 +61,9 @@ answer! {
         degenerate: Vec<Degenerate>,
         /// The numbers used, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
+        /// The queries, for model/ply.
+        #[schema(ignore)]
+        shape: Shape,
     }
 }
 
@@ -75,7 +80,7 @@ path: "/v1/normals", tag: "geometry", answer: "Normals at the queries"
 
 impl Operation for NormalsRequest {
     type Work = GeometryWork;
-    const HAS_SURFACE: bool = true;
+    const FORMATS: &[Format] = &[Format::Json, Format::Safetensors, Format::Ply];
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<GeometryWork>, Problem> {
         let fit = Fit { sites: self.sites.take(), ..self.take_fit() };
@@ -95,6 +100,7 @@ impl Operation for NormalsRequest {
             degenerate: surface.degenerate(),
             normal_deviations: surface.deviations().map(|deviations| deviations.normal),
             diagnostics: surface.diagnostics(fits),
+            shape: Shape::of_points(work.queries),
         })
     }
 }

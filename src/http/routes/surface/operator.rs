@@ -124,7 +124,7 @@ impl AppliedWork {
         let n_numbers = planner.check_answer(of_operator.and_then(|n| n.checked_mul(n_lists)))?;
         let cost = Cost { work, n_numbers, n_held: n + n_surface_points + m * d };
         let work = Self { values, queries, request };
-        Ok(Plan { main: main.into(), surface: Some(surface.into()), work, cost })
+        Ok(Plan::on_surface(main, surface, work, cost))
     }
 
     /// Applies the operator to the function through all values, or to functions that are kriged around each
@@ -269,7 +269,7 @@ impl MatrixWork {
             n_held: m * d,
         };
         let work = Self { queries, request };
-        Ok(Plan { main: main.into(), surface: Some(surface.into()), work, cost })
+        Ok(Plan::on_surface(main, surface, work, cost))
     }
 
     /// Computes the matrix, with a column for each point of the client's cloud.
@@ -345,7 +345,7 @@ impl StencilWork {
             n_held: m * d,
         };
         let work = Self { nodes, queries, request };
-        Ok(Plan { main: main.into(), surface: None, work, cost })
+        Ok(Plan::of_surface(main, work, cost))
     }
 
     /// Assembles the matrix. Flags queries around which its nodes do not resolve the surface.

@@ -105,7 +105,6 @@ path: "/v1/surface-gradient/matrix", tag: "operators", answer: "The matrices"
 
 impl Operation for SurfaceGradientRequest {
     type Work = AppliedWork;
-    const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<AppliedWork>, Problem> {
         let values = std::mem::take(&mut self.values);
@@ -133,7 +132,6 @@ impl Operation for SurfaceGradientRequest {
 
 impl Operation for SurfaceGradientMatrixRequest {
     type Work = MatrixWork;
-    const HAS_SURFACE: bool = true;
     const FORMATS: &[Format] = &[Format::Json, Format::Safetensors, Format::Npy];
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<MatrixWork>, Problem> {
@@ -192,7 +190,6 @@ path: "/v1/surface-gradient/sparse-matrix", tag: "operators", answer: "The matri
 
 impl Operation for SurfaceGradientSparseMatrixRequest {
     type Work = StencilWork;
-    const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<StencilWork>, Problem> {
         let fit = self.take_fit();

@@ -67,7 +67,6 @@ pub struct RegionsWork {
 
 impl Operation for RegionsRequest {
     type Work = RegionsWork;
-    const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<RegionsWork>, Problem> {
         let fit = self.take_fit();
@@ -87,12 +86,7 @@ impl Operation for RegionsRequest {
         check_points(&coarse, n, "/coarse")?;
         let n_numbers = planner.check_answer(n.checked_mul(8 + 4 * d))?;
         let cost = Cost { work: regions_price(n, d), n_numbers, n_held: 2 * n };
-        Ok(Plan {
-            main: main.into(),
-            surface: None,
-            work: RegionsWork { own: self.own, coarse, directions },
-            cost,
-        })
+        Ok(Plan::of_surface(main, RegionsWork { own: self.own, coarse, directions }, cost))
     }
 
     fn compute(work: RegionsWork, fits: &Fits, observer: &JobObserver) -> Result<RegionsResponse, Problem> {

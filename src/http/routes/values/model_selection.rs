@@ -226,7 +226,7 @@ impl Operation for ModelSelectionRequest {
         search.check_axes_of(d)?;
         let n_numbers = planner.check_answer(n.checked_mul(3).and_then(|n| n.checked_add(4 * N_ALPHAS)))?;
         let cost = Cost { work: search.price(n, d, main.n_length_scales()), n_numbers, n_held: n };
-        Ok(Plan { main: main.into(), surface: None, work: Work { values, search }, cost })
+        Ok(Plan::of_values(main, Work { values, search }, cost))
     }
 
     fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<ModelSelectionResponse, Problem> {

@@ -10,7 +10,7 @@ use crate::config::Config;
 use crate::http::compute::FLOPS_PER_PARSED_BYTE;
 use crate::http::problem::Problem;
 use crate::http::wire::compression::decompress;
-use crate::http::wire::negotiation::{Coding, Format};
+use crate::http::wire::negotiation::{BodyFormat, Coding};
 use crate::memory::NUMBERS_PER_BODY;
 
 /// Usual decompression ratio at most: text and numbers seldom compress to less than an eighth.
@@ -18,7 +18,7 @@ const USUAL_RATIO: usize = 8;
 
 /// A request body as received, possibly compressed.
 pub struct RequestBody {
-    format: Format,
+    format: BodyFormat,
     coding: Coding,
     bytes: Vec<u8>,
     /// Largest allowed number of bytes once decompressed.
@@ -27,7 +27,7 @@ pub struct RequestBody {
 
 impl RequestBody {
     /// Wraps a body that is complete in memory. Decompressed, it may have at most `limit` bytes.
-    pub fn new(format: Format, coding: Coding, bytes: Vec<u8>, limit: usize) -> Self {
+    pub fn new(format: BodyFormat, coding: Coding, bytes: Vec<u8>, limit: usize) -> Self {
         Self { format, coding, bytes, limit }
     }
 
@@ -83,7 +83,7 @@ impl RequestBody {
 
 /// A request body without compression.
 pub struct UnpackedBody {
-    format: Format,
+    format: BodyFormat,
     bytes: Vec<u8>,
 }
 
@@ -102,17 +102,17 @@ impl UnpackedBody {
     /// - 422 with a pointer for a well-formed body that is not a `T`.
     pub fn parse<T: DeserializeOwned>(&self, context: &ParseContext<'_>) -> Result<T, Problem> {
         match self.format {
-            Format::Json => parse_json(&self.bytes, context),
-            Format::Safetensors => parse_safetensors(&self.bytes, context),
-            Format::Npy => parse_npy(&self.bytes, context),
-            Format::Ply => parse_ply(&self.bytes, context),
+            BodyFormat::Json => parse_json(&self.bytes, context),
+            BodyFormat::Safetensors => parse_safetensors(&self.bytes, context),
+            BodyFormat::Npy => parse_npy(&self.bytes, context),
+            BodyFormat::Ply => parse_ply(&self.bytes, context),
         }
     }
 }
 
 /// Format, coding and limit of a body, which determine the memory that reading it takes.
 pub struct Parsing {
-    format: Format,
+    format: BodyFormat,
     coding: Coding,
     limit: usize,
 }
@@ -133,9 +133,9 @@ impl Parsing {
         match self.format {
             // A number takes at least two bytes of JSON, including its comma, and at least four bytes in
             // tensors.
-            Format::Json | Format::Safetensors | Format::Npy => size_of::<f64>() / 2,
+            BodyFormat::Json | BodyFormat::Safetensors | BodyFormat::Npy => size_of::<f64>() / 2,
             // A coordinate may take a single byte.
-            Format::Ply => size_of::<f64>(),
+            BodyFormat::Ply => size_of::<f64>(),
         }
     }
 
@@ -143,12 +143,12 @@ impl Parsing {
     fn n_bytes_of_numbers(&self, config: &Config) -> usize {
         let n_rows = config.max_points.saturating_add(config.max_queries);
         match self.format {
-            Format::Json | Format::Safetensors | Format::Npy => {
+            BodyFormat::Json | BodyFormat::Safetensors | BodyFormat::Npy => {
                 n_rows.saturating_mul(4 * size_of::<f64>()).saturating_mul(config.max_dimension)
             }
             // Points and normals in three dimensions. An estimate above a body's share of memory
             // (`memory.rs`) could never be granted: the client would be told to retry for ever.
-            Format::Ply => (6 * size_of::<f64>())
+            BodyFormat::Ply => (6 * size_of::<f64>())
                 .saturating_mul(config.max_points)
                 .min(NUMBERS_PER_BODY.saturating_mul(self.limit)),
         }

@@ -50,7 +50,7 @@ impl<'a> ParseContext<'a> {
             List::Queries => self.max_queries,
             List::Sites => MAX_SITES,
             List::Quantiles => MAX_QUANTILES,
-            List::Coordinates | List::LengthScales => self.max_dimension,
+            List::Coordinates | List::PerAxis => self.max_dimension,
             List::Other => usize::MAX,
         }
     }
@@ -64,7 +64,7 @@ impl<'a> ParseContext<'a> {
             (List::Queries, _) => too_many_queries(limit, length),
             (List::Numbers, _) => too_many("entries", limit, length, ONE_PER_POINT),
             (List::ValueLists, _) => too_many("lists of values", limit, length, SPLIT_LISTS),
-            (List::LengthScales, _) => too_many("length scales", limit, length, ONE_PER_COORDINATE),
+            (List::PerAxis, _) => too_many("entries", limit, length, ONE_PER_COORDINATE),
             (List::Sites, _) => too_many_sites(limit, length),
             (List::Quantiles, _) => too_many("quantiles", limit, length, FEWER_QUANTILES),
             (List::Points | List::Coordinates | List::Other, _) => too_many_points(limit, length),
@@ -89,7 +89,7 @@ pub(super) enum List {
     /// Probabilities at which quantiles are wanted.
     Quantiles,
     /// A list with a number per axis.
-    LengthScales,
+    PerAxis,
     /// The coordinates of a row.
     Coordinates,
     /// Strings, or not a list at all.
@@ -104,7 +104,7 @@ impl List {
             "sites" => Self::Sites,
             "values" | "noise_variances" => Self::Numbers,
             "quantiles" => Self::Quantiles,
-            "length_scales" => Self::LengthScales,
+            "length_scales" | "max" | "min" => Self::PerAxis,
             _ => Self::Other,
         }
     }
@@ -119,9 +119,7 @@ impl List {
         match self {
             Self::Points | Self::Queries | Self::Sites => Self::Coordinates,
             Self::ValueLists => Self::Numbers,
-            Self::Numbers | Self::Quantiles | Self::LengthScales | Self::Coordinates | Self::Other => {
-                Self::Other
-            }
+            Self::Numbers | Self::Quantiles | Self::PerAxis | Self::Coordinates | Self::Other => Self::Other,
         }
     }
 }
@@ -236,6 +234,8 @@ mod tests {
             names,
             [
                 "length_scales",
+                "max",
+                "min",
                 "noise_variances",
                 "normals",
                 "points",

@@ -15,6 +15,7 @@ use super::array::Array;
 use super::chunk::{Chunk, ChunkBuilder};
 use super::integers::Integers;
 use super::json;
+use super::model::{Model, Shape};
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::http::wire::negotiation::Format;
@@ -83,14 +84,14 @@ impl Member for Array {
         if !self.is_finite() {
             return Err(beyond_float64());
         }
-        parts.0.push((name, Part::Numbers(self)));
+        parts.members.push((name, Part::Numbers(self)));
         Ok(())
     }
 }
 
 impl Member for Integers {
     fn add_to(self, name: &'static str, parts: &mut Parts) -> Result<(), Problem> {
-        parts.0.push((name, Part::Integers(self)));
+        parts.members.push((name, Part::Integers(self)));
         Ok(())
     }
 }
@@ -116,9 +117,20 @@ fn beyond_float64() -> Problem {
     Problem::new(Slug::InvalidRequest, detail)
 }
 
+impl Member for Shape {
+    fn add_to(self, _name: &'static str, parts: &mut Parts) -> Result<(), Problem> {
+        parts.shape = Some(self);
+        Ok(())
+    }
+}
+
 /// The members of an answer, in order.
 #[derive(Default)]
-pub struct Parts(Vec<(&'static str, Part)>);
+pub struct Parts {
+    members: Vec<(&'static str, Part)>,
+    /// Where the answer lies in space, for the formats of models.
+    shape: Option<Shape>,
+}
 
 enum Part {
     Numbers(Array),
@@ -135,7 +147,7 @@ impl Parts {
     /// client, so those were too large.
     pub fn add_json(&mut self, name: &'static str, value: &impl Serialize) -> Result<(), Problem> {
         let text = json::to_vec(value).map_err(|_| beyond_float64())?;
-        self.0.push((name, Part::Json(text)));
+        self.members.push((name, Part::Json(text)));
         Ok(())
     }
 
@@ -148,7 +160,7 @@ impl Parts {
             Format::Json => Ok(self.into_json().finish()),
             Format::Safetensors => self.write_safetensors().ok_or_else(Problem::internal),
             Format::Npy => self.write_npy().ok_or_else(Problem::internal),
-            Format::Ply => Err(Problem::internal()),
+            Format::Ply | Format::Gltf | Format::Obj => self.write_model(format),
         }
     }
 
@@ -156,7 +168,7 @@ impl Parts {
     fn into_json(self) -> ChunkBuilder {
         let mut chunks = ChunkBuilder::default();
         let mut separator = '{';
-        for (name, part) in self.0 {
+        for (name, part) in self.members {
             chunks.text(format!("{separator}\"{name}\":").as_bytes());
             separator = ',';
             match part {
@@ -176,15 +188,19 @@ impl Parts {
     /// entry `response`.
     fn write_safetensors(self) -> Option<Vec<Chunk>> {
         let (arrays, others): (Vec<_>, Vec<_>) =
-            self.0.into_iter().partition(|(_, part)| !matches!(part, Part::Json(_)));
+            self.members.into_iter().partition(|(_, part)| !matches!(part, Part::Json(_)));
         let mut response = Vec::new();
-        Parts(others).into_json().finish().iter().for_each(|chunk| chunk.write(&mut response));
+        Parts { members: others, shape: None }
+            .into_json()
+            .finish()
+            .iter()
+            .for_each(|chunk| chunk.write(&mut response));
         let metadata = HashMap::from([("response".to_owned(), String::from_utf8(response).ok()?)]);
         let (mut tensors, mut bodies, mut start) = (Vec::new(), Vec::new(), 0);
         for (name, part) in arrays {
             let (shape, dtype, data) = match part {
                 Part::Numbers(array) => (array.shape().to_vec(), Dtype::F64, array.into_bytes()),
-                Part::Integers(numbers) => (vec![numbers.len()], Dtype::I64, numbers.into_bytes()),
+                Part::Integers(numbers) => (numbers.shape(), Dtype::I64, numbers.into_bytes()),
                 Part::Json(_) => continue,
             };
             let data_offsets = (start, start + data.len());
@@ -199,10 +215,29 @@ impl Parts {
         Some([Bytes::from(head)].into_iter().chain(bodies).map(Chunk::of).collect())
     }
 
+    /// Writes the file of another program.
+    ///
+    /// # Errors
+    /// 406 `not-acceptable` for points in more than three dimensions, which these files cannot hold. 500
+    /// `internal` for an answer without a place in space.
+    fn write_model(self, format: Format) -> Result<Vec<Chunk>, Problem> {
+        let shape = self.shape.as_ref().ok_or_else(Problem::internal)?;
+        if shape.positions.dimension() > 3 {
+            let detail = format!("{} holds points in the plane or in space", format.media_type());
+            return Err(Problem::new(Slug::NotAcceptable, detail));
+        }
+        let arrays = self.members.iter().filter_map(|(name, part)| match part {
+            Part::Numbers(array) => Some((*name, array)),
+            Part::Integers(_) | Part::Json(_) => None,
+        });
+        let file = Model::of(shape, arrays).write(format).ok_or_else(Problem::internal)?;
+        Ok(vec![Chunk::of(Bytes::from(file))])
+    }
+
     /// Writes the first float64 array of the answer: magic, version 1.0, length of the header, header,
     /// numbers.
     fn write_npy(self) -> Option<Vec<Chunk>> {
-        let mut arrays = self.0.into_iter().filter_map(|(_, part)| match part {
+        let mut arrays = self.members.into_iter().filter_map(|(_, part)| match part {
             Part::Numbers(array) => Some(array),
             Part::Integers(_) | Part::Json(_) => None,
         });

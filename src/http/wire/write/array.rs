@@ -45,6 +45,13 @@ impl Array {
         &self.shape
     }
 
+    /// A component of an entry of the first axis, NaN under a null.
+    pub fn row_entry(&self, row: usize, component: usize) -> f64 {
+        let block = self.block(0);
+        let is_null = self.nulls.as_ref().is_some_and(|nulls| nulls.axis == 0 && nulls.is_null[row]);
+        if is_null { f64::NAN } else { self.data[row * block + component] }
+    }
+
     /// Number of numbers, including those under nulls.
     pub fn n_numbers(&self) -> usize {
         self.data.len()

@@ -6,3 +6,4 @@ pub mod chunk;
 pub mod encode;
 pub mod integers;
 pub mod json;
+pub mod model;

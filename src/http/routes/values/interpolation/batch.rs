@@ -110,7 +110,7 @@ impl Operation for InterpolationBatchRequest {
         let cost =
             Cost { work, n_numbers: planner.check_answer(n_numbers)?, n_held: values.list.len() + m * d };
         let work = Work { values, queries, derivatives, has_deviations };
-        Ok(Plan { main: main.into(), surface: None, work, cost })
+        Ok(Plan::of_values(main, work, cost))
     }
 
     fn compute(

@@ -117,7 +117,7 @@ impl Operation for InterpolationRequest {
             n_held: n + m * d,
         };
         let work = Work { values, queries, derivatives, has_deviations };
-        Ok(Plan { main: main.into(), surface: None, work, cost })
+        Ok(Plan::of_values(main, work, cost))
     }
 
     fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<InterpolationResponse, Problem> {

@@ -167,7 +167,7 @@ impl Work {
             n_numbers: planner.check_answer(asked.n_numbers(values.n_lists, m, d))?,
             n_held: values.list.len() + m * d,
         };
-        Ok(Plan { main: main.into(), surface: None, work: Self { values, queries, asked }, cost })
+        Ok(Plan::of_values(main, Self { values, queries, asked }, cost))
     }
 
     fn request(&self) -> JetRequest<'_> {

@@ -44,9 +44,15 @@ from .laplace_beltrami_response import LaplaceBeltramiResponse
 from .laplace_beltrami_sparse_matrix_request import LaplaceBeltramiSparseMatrixRequest
 from .laplace_beltrami_sparse_matrix_response import LaplaceBeltramiSparseMatrixResponse
 from .left_out import LeftOut
+from .level_set_request import LevelSetRequest
+from .level_set_response import LevelSetResponse
 from .link import Link
 from .matrix_format import MatrixFormat
 from .mean_choice import MeanChoice
+from .mesh_bounds import MeshBounds
+from .mesh_include import MeshInclude
+from .mesh_part import MeshPart
+from .mesh_quality import MeshQuality
 from .model_selection_request import ModelSelectionRequest
 from .model_selection_response import ModelSelectionResponse
 from .noise_ratio import NoiseRatio
@@ -85,6 +91,7 @@ from .surface_used import SurfaceUsed
 from .tile_regions import TileRegions
 from .values_include import ValuesInclude
 from .version import Version
+from .vertex_support import VertexSupport
 from .warning import Warning_
 from .warning_code import WarningCode
 
@@ -133,9 +140,15 @@ __all__ = (
     "LaplaceBeltramiSparseMatrixRequest",
     "LaplaceBeltramiSparseMatrixResponse",
     "LeftOut",
+    "LevelSetRequest",
+    "LevelSetResponse",
     "Link",
     "MatrixFormat",
     "MeanChoice",
+    "MeshBounds",
+    "MeshInclude",
+    "MeshPart",
+    "MeshQuality",
     "ModelSelectionRequest",
     "ModelSelectionResponse",
     "NoiseRatio",
@@ -174,6 +187,7 @@ __all__ = (
     "TileRegions",
     "ValuesInclude",
     "Version",
+    "VertexSupport",
     "WarningCode",
     "Warning_",
 )

@@ -10,6 +10,7 @@ class OperationName(StrEnum):
     COMPUTE_INTERPOLATION = "compute_interpolation"
     COMPUTE_INTERPOLATION_BATCH = "compute_interpolation_batch"
     COMPUTE_LAPLACE_BELTRAMI = "compute_laplace_beltrami"
+    COMPUTE_LEVEL_SET = "compute_level_set"
     COMPUTE_NORMALS = "compute_normals"
     COMPUTE_POSTERIOR = "compute_posterior"
     COMPUTE_POSTERIOR_BATCH = "compute_posterior_batch"

@@ -12,6 +12,7 @@ class WarningCode(StrEnum):
     OFFSET_MODEL_USED = "offset_model_used"
     OPEN_CLOUD = "open_cloud"
     ORIENTATION_REPAIRED = "orientation_repaired"
+    RAW_MESH = "raw_mesh"
     REFINED = "refined"
     VARIANCE_CLAMPED = "variance_clamped"
 

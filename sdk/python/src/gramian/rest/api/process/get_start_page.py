@@ -19,10 +19,14 @@ def _get_kwargs() -> dict[str, Any]:
     return _kwargs
 
 
-def _parse_response(*, client: AuthenticatedClient | Client, response: httpx.Response) -> Problem | str | None:
+def _parse_response(*, client: AuthenticatedClient | Client, response: httpx.Response) -> None | Problem | str:
     if response.status_code == 200:
         response_200 = response.text
         return response_200
+
+    if response.status_code == 304:
+        response_304 = None
+        return response_304
 
     if response.status_code == 400:
         response_400 = Problem.from_dict(response.json())
@@ -45,7 +49,9 @@ def _parse_response(*, client: AuthenticatedClient | Client, response: httpx.Res
         return None
 
 
-def _build_response(*, client: AuthenticatedClient | Client, response: httpx.Response) -> Response[Problem | str]:
+def _build_response(
+    *, client: AuthenticatedClient | Client, response: httpx.Response
+) -> Response[None | Problem | str]:
     return Response(
         status_code=HTTPStatus(response.status_code),
         content=response.content,
@@ -57,18 +63,19 @@ def _build_response(*, client: AuthenticatedClient | Client, response: httpx.Res
 def sync_detailed(
     *,
     client: AuthenticatedClient | Client,
-) -> Response[Problem | str]:
-    """Begin here
+) -> Response[None | Problem | str]:
+    """See a cloud
 
-     Returns a page with links to the documentation, the OpenAPI documents for generators and the
-    problems.
+     Returns a page that shows clouds in three dimensions with normals, curvatures, meshes and their
+    error
+    bars. It asks this service, and loads nothing from elsewhere.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
         httpx.TimeoutException: If the request takes longer than Client.timeout.
 
     Returns:
-        Response[Problem | str]
+        Response[None | Problem | str]
     """
 
     kwargs = _get_kwargs()
@@ -83,18 +90,19 @@ def sync_detailed(
 def sync(
     *,
     client: AuthenticatedClient | Client,
-) -> Problem | str | None:
-    """Begin here
+) -> None | Problem | str:
+    """See a cloud
 
-     Returns a page with links to the documentation, the OpenAPI documents for generators and the
-    problems.
+     Returns a page that shows clouds in three dimensions with normals, curvatures, meshes and their
+    error
+    bars. It asks this service, and loads nothing from elsewhere.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
         httpx.TimeoutException: If the request takes longer than Client.timeout.
 
     Returns:
-        Problem | str
+        None | Problem | str
     """
 
     return sync_detailed(
@@ -105,18 +113,19 @@ def sync(
 async def asyncio_detailed(
     *,
     client: AuthenticatedClient | Client,
-) -> Response[Problem | str]:
-    """Begin here
+) -> Response[None | Problem | str]:
+    """See a cloud
 
-     Returns a page with links to the documentation, the OpenAPI documents for generators and the
-    problems.
+     Returns a page that shows clouds in three dimensions with normals, curvatures, meshes and their
+    error
+    bars. It asks this service, and loads nothing from elsewhere.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
         httpx.TimeoutException: If the request takes longer than Client.timeout.
 
     Returns:
-        Response[Problem | str]
+        Response[None | Problem | str]
     """
 
     kwargs = _get_kwargs()
@@ -129,18 +138,19 @@ async def asyncio_detailed(
 async def asyncio(
     *,
     client: AuthenticatedClient | Client,
-) -> Problem | str | None:
-    """Begin here
+) -> None | Problem | str:
+    """See a cloud
 
-     Returns a page with links to the documentation, the OpenAPI documents for generators and the
-    problems.
+     Returns a page that shows clouds in three dimensions with normals, curvatures, meshes and their
+    error
+    bars. It asks this service, and loads nothing from elsewhere.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
         httpx.TimeoutException: If the request takes longer than Client.timeout.
 
     Returns:
-        Problem | str
+        None | Problem | str
     """
 
     return (

@@ -1,6 +1,8 @@
-//! HTML pages for people: the start page, and explanations of problems. No page needs a key.
+//! HTML pages for people: the page that shows clouds, and explanations of problems. No page needs a key.
 //!
 //! Links are relative, so that they work behind a proxy that serves everything below a path prefix.
+
+pub mod viewer;
 
 use std::fmt::Write;
 
@@ -10,33 +12,6 @@ use axum::response::Html;
 use crate::http::openapi::responses::{PageProblems, ProbeProblems};
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
-
-/// Begin here
-///
-/// Returns a page with links to the documentation, the OpenAPI documents for generators and the problems.
-#[utoipa::path(
-    get,
-    path = "/",
-    tag = "process",
-    responses((status = 200, description = "The page", body = String, content_type = "text/html"), ProbeProblems)
-)]
-pub async fn get_start_page() -> Html<String> {
-    let links = [
-        ("docs/", "Interactive documentation of the API"),
-        ("openapi.json", "The OpenAPI document, version 3.1"),
-        ("openapi-3.0.json", "The OpenAPI document, version 3.0, for generators that need it"),
-        ("problems", "What refusals mean"),
-        ("version", "What is running"),
-        ("health/ready", "Whether the service is ready for requests"),
-    ];
-    let mut body =
-        String::from("<p>Geometric kernel interpolation and regression on point clouds.</p>\n<ul>\n");
-    for (path, text) in links {
-        // Writing to a String cannot fail.
-        let _ = writeln!(body, "<li><a href=\"{path}\">{text}</a></li>");
-    }
-    page("gramian", &(body + "</ul>"))
-}
 
 /// List the problems
 ///

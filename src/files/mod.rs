@@ -1,0 +1,167 @@
+//! Subcommands that answer files without a server. They send the request through the same router, in this
+//! process and without a port, so that answers and refusals are those of the service.
+
+mod progress;
+mod router;
+mod table;
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use axum::body::Bytes;
+use serde_json::{Map, Value, json};
+
+use crate::config::Config;
+use router::{Answerer, Failure};
+
+const JSON: &str = "application/json";
+
+/// Media types of answers by the ending of a file.
+const ANSWERS: [(&str, &str); 6] = [
+    ("json", JSON),
+    ("safetensors", "application/x-safetensors"),
+    ("npy", "application/x-npy"),
+    ("ply", "model/ply"),
+    ("glb", "model/gltf-binary"),
+    ("obj", "model/obj"),
+];
+
+/// A subcommand that reads a file and writes a file.
+#[derive(clap::Subcommand)]
+pub enum FileCommand {
+    /// Compute normals of a cloud: gramian normals scan.ply -o scan-normals.ply
+    Normals(OfCloud),
+    /// Compute curvatures of a cloud: gramian curvatures scan.ply -o scan-curvatures.ply
+    Curvatures(OfCloud),
+    /// Mesh the surface of a cloud: gramian mesh scan.ply -o scan.glb
+    Mesh(OfCloud),
+    /// Answer a request: gramian ask laplace-beltrami/sparse-matrix request.json -o matrix.safetensors
+    Ask {
+        /// The end of a path under /v1, such as interpolation or laplace-beltrami/matrix.
+        operation: String,
+        /// A file with the request as JSON.
+        request: PathBuf,
+        /// The file of the answer: .json, .safetensors, .npy, .ply, .glb or .obj. Default: JSON on
+        /// standard output.
+        #[arg(short, long)]
+        output: Option<PathBuf>,
+    },
+}
+
+/// A cloud in a file, and where its answer goes.
+#[derive(clap::Args)]
+pub struct OfCloud {
+    /// A file of points: .ply, .npy, .json, or rows of numbers (.xyz, .csv, .txt).
+    cloud: PathBuf,
+    /// The file of the answer: .ply, .json or .safetensors, and for meshes .glb or .obj.
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Add standard deviations.
+    #[arg(long)]
+    deviations: bool,
+    /// Further members of the request as JSON, such as '{"alpha": 1e-6, "duplicates": "merge"}'.
+    #[arg(long, value_name = "JSON")]
+    with: Option<String>,
+}
+
+/// Answers a subcommand.
+///
+/// The exit code is 0 for an answer, 1 if a file cannot be read or written, 3 if the request was refused,
+/// and 4 if it failed. (2 is for wrong arguments.)
+pub fn run(command: FileCommand, config: Config) -> ExitCode {
+    let answered = tokio::runtime::Runtime::new()
+        .map_err(|error| Failure::File(format!("the runtime does not start: {error}")))
+        .and_then(|runtime| runtime.block_on(answer(command, config)));
+    match answered {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("gramian: {failure}");
+            ExitCode::from(failure.exit_code())
+        }
+    }
+}
+
+async fn answer(command: FileCommand, config: Config) -> Result<(), Failure> {
+    match command {
+        FileCommand::Normals(of) => of_cloud("normals", &of, config).await,
+        FileCommand::Curvatures(of) => of_cloud("curvatures", &of, config).await,
+        FileCommand::Mesh(of) => of_cloud("level-set", &of, config).await,
+        FileCommand::Ask { operation, request, output } => {
+            let accept = output.as_deref().map_or(Ok(JSON), media_type_of)?;
+            let body = read(&request)?;
+            let answerer = Answerer::start(config).await?;
+            let found = answerer.compute(&format!("/v1/{operation}"), body, accept).await?;
+            write(output.as_deref(), &found)
+        }
+    }
+}
+
+async fn of_cloud(operation: &str, of: &OfCloud, config: Config) -> Result<(), Failure> {
+    let accept = media_type_of(&of.output)?;
+    let mut request = match &of.with {
+        None => Map::new(),
+        Some(text) => serde_json::from_str(text)
+            .map_err(|error| Failure::Argument(format!("--with is not a JSON object: {error}")))?,
+    };
+    if of.deviations {
+        let include = request.entry("include").or_insert(json!([])).as_array_mut();
+        let include = include.ok_or_else(|| Failure::Argument("--with: include is not a list".to_owned()))?;
+        if !include.contains(&json!("deviations")) {
+            include.push(json!("deviations"));
+        }
+    }
+    let (media_type, body) = cloud_in(&of.cloud)?;
+    let answerer = Answerer::start(config).await?;
+    let cloud = answerer.register(media_type, body).await?;
+    request.insert("cloud".to_owned(), json!({"id": cloud}));
+    let body = Bytes::from(Value::Object(request).to_string());
+    write(Some(&of.output), &answerer.compute(&format!("/v1/{operation}"), body, accept).await?)
+}
+
+/// The media type and the bytes of a cloud in a file.
+fn cloud_in(path: &Path) -> Result<(&'static str, Bytes), Failure> {
+    let bytes = read(path)?;
+    match ending(path).as_str() {
+        "ply" => Ok(("model/ply", bytes)),
+        "npy" => Ok(("application/x-npy", bytes)),
+        "json" => Ok((JSON, bytes)),
+        _ => {
+            let refused = |detail| Failure::File(format!("{}: {detail}", path.display()));
+            let text = std::str::from_utf8(&bytes).map_err(|_| refused("not a text".to_owned()))?;
+            let tensors = table::tensors_of(text).map_err(refused)?;
+            Ok(("application/x-safetensors", tensors.into()))
+        }
+    }
+}
+
+fn ending(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
+}
+
+fn media_type_of(path: &Path) -> Result<&'static str, Failure> {
+    let ending = ending(path);
+    let known = ANSWERS.iter().find(|(name, _)| *name == ending);
+    known.map(|(_, media_type)| *media_type).ok_or_else(|| {
+        let names = ANSWERS.map(|(name, _)| format!(".{name}")).join(", ");
+        Failure::Argument(format!("{}: the file of an answer ends with one of {names}", path.display()))
+    })
+}
+
+fn read(path: &Path) -> Result<Bytes, Failure> {
+    let found = std::fs::read(path);
+    found.map(Bytes::from).map_err(|error| Failure::File(format!("{}: {error}", path.display())))
+}
+
+fn write(path: Option<&Path>, bytes: &[u8]) -> Result<(), Failure> {
+    match path {
+        Some(path) => {
+            std::fs::write(path, bytes).map_err(|error| Failure::File(format!("{}: {error}", path.display())))
+        }
+        None => {
+            let mut out = std::io::stdout().lock();
+            let written = out.write_all(bytes).and_then(|()| out.write_all(b"\n"));
+            written.map_err(|error| Failure::File(format!("standard output: {error}")))
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! Answers with a mesh, and with what is known of its vertices.
+
+use std::sync::Arc;
+
+use super::plan::{LevelOfValues, LevelSetWork};
+use super::{LevelSetResponse, MeshPart, VertexSupport};
+use crate::http::compute::JobObserver;
+use crate::http::fields::{Diagnostics, Warning, WarningCode};
+use crate::http::problem::Problem;
+use crate::http::serve::answers::surface::DeviationArrays;
+use crate::http::serve::fitted::Fits;
+use crate::http::wire::write::array::Array;
+use crate::http::wire::write::integers::Integers;
+use crate::http::wire::write::model::Shape;
+use gramian_numerics::model::{JetRequest, Report};
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::points::sampling::median;
+use gramian_numerics::sums::jets::JetOrder;
+use gramian_numerics::surface::geometry::Orientation;
+use gramian_numerics::surface::mesh::fields::interpolant::LevelOf;
+use gramian_numerics::surface::mesh::surface::{curvatures_of_level, mesh_of_level, mesh_of_surface};
+use gramian_numerics::surface::mesh::{Closedness, DOUBTFUL, LevelSet, Part, Support};
+
+/// What was asked about the vertices of a mesh.
+#[derive(Default)]
+struct AtVertices {
+    principal: Option<Array>,
+    mean: Option<Array>,
+    position_deviations: Option<Array>,
+    deviations: Option<DeviationArrays>,
+}
+
+/// A mesh with its vertices as queries.
+struct Meshed {
+    found: LevelSet,
+    vertices: Arc<Cloud>,
+    /// Share of the points with two sides. Absent for a level of values.
+    closedness: Option<f64>,
+}
+
+impl Meshed {
+    /// Fails with `empty` if the mesh has no vertices.
+    fn new(found: LevelSet, closedness: Option<f64>, empty: Problem) -> Result<Self, Problem> {
+        let vertices = Cloud::new(found.mesh.vertices.clone(), found.mesh.dimension).map_err(|_| empty)?;
+        Ok(Self { found, vertices: Arc::new(vertices), closedness })
+    }
+}
+
+/// Meshes the surface of a cloud.
+///
+/// # Errors
+/// Returns the refusals of the numerics as a [`Problem`]. 422 at `/step` if there is no surface.
+pub fn of_surface(
+    work: &LevelSetWork,
+    fits: &Fits,
+    observer: &JobObserver,
+) -> Result<LevelSetResponse, Problem> {
+    let (fitted, surface) = (fits.surface(), fits.made_surface()?);
+    let made = mesh_of_surface(surface, &work.options, observer);
+    let (found, closedness) = made.map_err(|error| fitted.refused(error))?;
+    let empty = "no surface was found here; make step shorter, or bounds wider";
+    let meshed = Meshed::new(found, Some(closedness.share), Problem::invalid_request("/step", empty))?;
+    let (k, d) = (meshed.vertices.n_points(), meshed.vertices.dimension());
+    let mut at = AtVertices::default();
+    let mut diagnostics = fitted.diagnostics(&Report::of_surface(surface), k);
+    if work.asked.has_curvatures || work.asked.geometry.has_deviations {
+        let found = fits.geometry(&meshed.vertices, &work.asked.geometry, observer)?;
+        if work.asked.has_curvatures {
+            let curvatures = found.geometry.curvatures(observer).map_err(|error| fitted.refused(error))?;
+            at.principal = Some(found.per_query(curvatures.principal, &[k, d - 1]));
+            at.mean = Some(found.per_query(curvatures.mean, &[k]));
+        }
+        let heights = found.geometry.deviations().map(|known| known.height.clone());
+        at.position_deviations = heights.map(|heights| found.known_per_query(heights, &[k]));
+        at.deviations = found.deviations();
+        diagnostics = found.diagnostics(fits);
+    }
+    diagnostics.warnings.extend(warning_of_closedness(closedness, work.options.is_open));
+    answer(work, meshed, at, diagnostics)
+}
+
+/// Meshes a level of the function through values.
+///
+/// # Errors
+/// Returns the refusals of the numerics as a [`Problem`]. 422 at `/level` if the function does not reach it.
+pub fn of_values(
+    work: &LevelSetWork,
+    of: &LevelOfValues,
+    fits: &Fits,
+    observer: &JobObserver,
+) -> Result<LevelSetResponse, Problem> {
+    let LevelOfValues { values, level } = of;
+    let function = fits.interpolant(values, observer)?;
+    let level = level.or_else(|| median(values.list.clone())).unwrap_or_default();
+    let field = LevelOf::new(&function, level, spread(&values.list));
+    let made = mesh_of_level(field, &work.options, observer);
+    let found = made.map_err(|error| fits.main.refused(error))?;
+    let empty = format!("the function does not reach {level} near the points; choose another level");
+    let meshed = Meshed::new(found, None, Problem::invalid_request("/level", empty))?;
+    let (k, d) = (meshed.vertices.n_points(), meshed.vertices.dimension());
+    let asked = JetRequest {
+        queries: &meshed.vertices,
+        order: if work.asked.has_curvatures { JetOrder::Hessian } else { JetOrder::Gradient },
+        has_variances: false,
+        deviations: work.asked.geometry.has_deviations.then_some(JetOrder::Value),
+    };
+    let (found, mut diagnostics) = fits.values_at(values, asked, observer)?;
+    let clamped = found.deviations.as_ref().map_or(&[][..], |deviations| &deviations.clamped);
+    diagnostics.warn_of_clamping(clamped);
+    let mut at = AtVertices::default();
+    if work.asked.has_curvatures {
+        let sign = if is_turned(work) { 1.0 } else { -1.0 };
+        let (principal, mean) = curvatures_of_level(&found.jets, sign);
+        at.principal = Some(Array::new(principal, &[k, d - 1]));
+        at.mean = Some(Array::new(mean, &[k]));
+    }
+    if let Some(deviations) = found.deviations {
+        // To first order, a vertex moves by the deviation of u over its slope.
+        let slope = |vertex: usize| found.jets.gradient(vertex).iter().map(|g| g * g).sum::<f64>().sqrt();
+        let moved = deviations.values.iter().enumerate().map(|(vertex, deviation)| deviation / slope(vertex));
+        at.position_deviations = Some(null_unless_finite(moved.collect()));
+    }
+    answer(work, meshed, at, diagnostics)
+}
+
+/// Whether normals point inward, as the gradient does.
+fn is_turned(work: &LevelSetWork) -> bool {
+    work.asked.geometry.orientation == Orientation::Gradient
+}
+
+/// A number per vertex, null where the function is flat and there is none.
+fn null_unless_finite(data: Vec<f64>) -> Array {
+    let is_null: Vec<bool> = data.iter().map(|x| !x.is_finite()).collect();
+    let k = data.len();
+    Array::new(data, &[k]).with_nulls(0, &is_null)
+}
+
+/// The difference between the greatest and the least value, unit V.
+fn spread(values: &[f64]) -> f64 {
+    let (min, max) =
+        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), v| (min.min(*v), max.max(*v)));
+    max - min
+}
+
+fn warning_of_closedness(closedness: Closedness, is_open: bool) -> Option<Warning> {
+    if is_open || closedness.share >= DOUBTFUL {
+        return None;
+    }
+    let detail = format!(
+        "{:.1} % of the points have no clear inside and outside; there the mesh may join sheets or close holes wrongly",
+        100.0 * (1.0 - closedness.share)
+    );
+    Some(Warning { code: WarningCode::OpenCloud, detail })
+}
+
+fn answer(
+    work: &LevelSetWork,
+    meshed: Meshed,
+    at: AtVertices,
+    mut diagnostics: Diagnostics,
+) -> Result<LevelSetResponse, Problem> {
+    let LevelSet { mesh, mut normals, residuals, support, parts, dropped, quality } = meshed.found;
+    let (k, d) = (mesh.n_vertices(), mesh.dimension);
+    if d == 3 && quality != work.options.quality {
+        let detail = "regular triangles would have had another topology; these are raw".to_owned();
+        diagnostics.warnings.push(Warning { code: WarningCode::RawMesh, detail });
+    }
+    let mut cells = mesh.cells;
+    if is_turned(work) {
+        normals.iter_mut().for_each(|c| *c = -*c);
+        cells.chunks_exact_mut(d).for_each(|cell| cell.swap(0, 1));
+    }
+    let codes = support.iter().map(|support| *support as u8).collect();
+    let shape = Shape { positions: meshed.vertices, cells: cells.clone(), labels: vec![("support", codes)] };
+    let [normal, principal, mean] = match at.deviations {
+        None => [None, None, None],
+        Some(found) if work.asked.has_curvatures => {
+            [Some(found.normal), Some(found.principal), Some(found.mean)]
+        }
+        Some(found) => [Some(found.normal), None, None],
+    };
+    Ok(LevelSetResponse {
+        vertices: Array::new(mesh.vertices, &[k, d]),
+        cells: Integers::rows(cells.into_iter().map(i64::from).collect(), d),
+        normals: Array::new(normals, &[k, d]),
+        support: support.into_iter().map(VertexSupport::from).collect(),
+        residuals: null_unless_finite(residuals),
+        principal_curvatures: at.principal,
+        mean_curvatures: at.mean,
+        position_deviations: at.position_deviations,
+        normal_deviations: normal,
+        principal_curvature_deviations: principal,
+        mean_curvature_deviations: mean,
+        parts: parts.into_iter().map(MeshPart::from).collect(),
+        dropped_parts: dropped.into_iter().map(MeshPart::from).collect(),
+        closedness: meshed.closedness,
+        diagnostics,
+        shape,
+    })
+}
+
+impl From<Support> for VertexSupport {
+    fn from(support: Support) -> Self {
+        match support {
+            Support::Observed => Self::Observed,
+            Support::Bridged => Self::Bridged,
+            Support::Extrapolated => Self::Extrapolated,
+        }
+    }
+}
+
+impl From<Part> for MeshPart {
+    fn from(part: Part) -> Self {
+        let Part { n_vertices, n_cells, euler_characteristic, n_boundary_edges, area } = part;
+        Self { n_vertices, n_cells, euler_characteristic, n_boundary_edges, area }
+    }
+}

@@ -1,0 +1,203 @@
+// The page in a real browser: pictures by their pixels, files, parameters, refusals, cancelling, sizes, rules.
+//
+// Asks the server at GRAMIAN_URL. Screenshots are left in target/page.
+
+import assert from "node:assert/strict";
+import { mkdirSync, readFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { after, before, test } from "node:test";
+
+const require = createRequire(`${process.cwd()}/target/sdk/node_modules/`);
+const { chromium } = require("playwright-core");
+const axe = readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
+
+const base = `${process.env.GRAMIAN_URL}/`;
+const pictures = "target/page";
+
+/** Without these, there is no WebGL where there is no graphics processor. */
+const GRAPHICS = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
+
+const DESK = { width: 1400, height: 900 };
+const PHONE = { width: 390, height: 800 };
+
+let browser;
+
+before(async () => {
+  mkdirSync(pictures, { recursive: true });
+  browser = await chromium.launch({ executablePath: "/usr/bin/chromium", args: ["--no-sandbox", ...GRAPHICS] });
+});
+after(() => browser.close());
+
+/** Opens the page and calls `use`. Nothing may be logged as an error, asked of others, or against the policy. */
+async function opened(hash, use, { viewport = DESK, expected = [], ...options } = {}) {
+  const context = await browser.newContext({ viewport, ...options });
+  const page = await context.newPage();
+  const wrong = [];
+  page.on("console", (message) => {
+    const text = message.text();
+    // Warnings of the software renderer are about itself.
+    if (message.type() === "error" && !expected.some((part) => text.includes(part))) wrong.push(text);
+  });
+  page.on("pageerror", (error) => wrong.push(error.stack));
+  page.on("request", (request) => {
+    if (!request.url().startsWith(base) && !/^(blob|data):/.test(request.url())) wrong.push(`asked ${request.url()}`);
+  });
+  try {
+    await page.goto(base + hash);
+    await use(page);
+    assert.deepEqual(wrong, []);
+  } finally {
+    await context.close();
+  }
+}
+
+function settled(page) {
+  return page.waitForSelector("body[data-state=settled]", { timeout: 120_000 });
+}
+
+/** Number of different colours in the picture, in a coarse raster. */
+async function nColours(page, name) {
+  await page.waitForTimeout(0);
+  const png = await page.locator("#scene").screenshot({ path: `${pictures}/${name}.png` });
+  return page.evaluate(async (base64) => {
+    const bytes = Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
+    const image = await createImageBitmap(new Blob([bytes]));
+    const canvas = new OffscreenCanvas(image.width, image.height);
+    const context = canvas.getContext("2d");
+    context.drawImage(image, 0, 0);
+    const { data } = context.getImageData(0, 0, image.width, image.height);
+    const colours = new Set();
+    for (let at = 0; at < data.length; at += 4) colours.add((data[at] >> 4) * 256 + (data[at + 1] >> 4) * 16 + (data[at + 2] >> 4));
+    return colours.size;
+  }, png.toString("base64"));
+}
+
+/** A sphere as an XYZ file. */
+function sphere(n) {
+  const rows = Array.from({ length: n }, (_, at) => {
+    const z = 1 - (2 * at + 1) / n;
+    const angle = at * Math.PI * (3 - Math.sqrt(5));
+    return [Math.sqrt(1 - z * z) * Math.cos(angle), Math.sqrt(1 - z * z) * Math.sin(angle), z].join(" ");
+  });
+  return rows.join("\n");
+}
+
+async function open(page, name, text) {
+  await page.setInputFiles("#file", { name, mimeType: "text/plain", buffer: Buffer.from(text) });
+  await page.waitForFunction((wanted) => document.querySelector("#cloud").textContent.startsWith(wanted), name);
+  await settled(page);
+}
+
+test("something beautiful shows before any click", () =>
+  opened("", async (page) => {
+    await settled(page);
+    assert.ok(await page.evaluate(() => document.createElement("canvas").getContext("webgl2") !== null));
+    assert.ok((await nColours(page, "first")) > 60);
+    assert.match(await page.textContent("#summary"), /^dragon: 12,000 points; mean curvature −/);
+    await page.screenshot({ path: `${pictures}/page.png` });
+  }));
+
+for (const example of ["torus", "lattice", "sphere", "ball", "curve", "part", "triangle", "half", "fineHalf", "square", "corner", "ellipse", "noisy", "noisier"]) {
+  test(`the example ${example} renders`, () =>
+    opened(`#example=${example}&section=2`, async (page) => {
+      await settled(page);
+      assert.ok((await nColours(page, example)) > 8);
+      assert.ok(!(await page.isVisible("#refusal")), await page.textContent("#refusal"));
+    }));
+}
+
+test("a mesh shows with what its vertices rest on", () =>
+  opened("#example=torus&operation=mesh&colour=support", async (page) => {
+    await settled(page);
+    assert.match(await page.textContent("#summary"), /Euler characteristic 0 and 0 open edges/);
+    assert.match(await page.textContent("#support"), /observed/);
+    assert.ok((await nColours(page, "mesh")) > 4);
+  }));
+
+test("a dropped file is read, and a parameter changes the answer", () =>
+  opened("", async (page) => {
+    await settled(page);
+    const transfer = await page.evaluateHandle((text) => {
+      const made = new DataTransfer();
+      made.items.add(new File([text], "ball.xyz"));
+      return made;
+    }, sphere(300));
+    await page.dispatchEvent("body", "drop", { dataTransfer: transfer });
+    await page.waitForFunction(() => document.querySelector("#cloud").textContent.startsWith("ball.xyz: 300 points"));
+    await settled(page);
+    const first = await page.textContent("#diagnostics");
+    await page.click("text=Kernel and solver");
+    await page.selectOption("[name=family]", "gauss");
+    await page.fill("[name=lengthScale]", "0.7");
+    await settled(page);
+    await page.waitForFunction((before) => document.querySelector("#diagnostics").textContent !== before, first);
+    assert.match(await page.textContent("#code"), /"length_scale":0.7/);
+    assert.match(page.url(), /lengthScale=0.7/);
+  }));
+
+test("a refusal has a remedy, and a button that applies it", () =>
+  opened("#example=ellipse&family=laplace&surface=signature", async (page) => {
+    await page.click("text=Choose the kernel automatically");
+    await settled(page);
+    await page.waitForFunction(() => document.querySelector("#summary").textContent.includes("mean curvature"));
+    assert.ok(await page.isHidden("#refusal"));
+    assert.equal(await page.inputValue("[name=family]"), "auto");
+  }, { expected: ["422"] }));
+
+test("a point tells its value and deviation, and its neighbours are reached by keys", () =>
+  opened("#example=sphere", async (page) => {
+    await settled(page);
+    const box = await page.locator("#scene").boundingBox();
+    await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+    await page.waitForSelector("#pinned:visible");
+    const first = await page.textContent("#pinned strong");
+    assert.match(await page.textContent("#pinned"), /mean curvature.*±.*1\/L/);
+    await page.keyboard.press("ArrowRight");
+    assert.notEqual(await page.textContent("#pinned strong"), first);
+  }));
+
+test("a computation is cancelled", () =>
+  opened("#example=million", async (page) => {
+    await page.waitForRequest((request) => request.url().endsWith("/events"), { timeout: 120_000 });
+    assert.ok((await nColours(page, "million")) > 8, "a million points are drawn while they are asked about");
+    const ended = page.waitForRequest((request) => request.method() === "DELETE", { timeout: 60_000 });
+    await page.click("#cancel");
+    await ended;
+    assert.ok(await page.isHidden("#progress"));
+  }, { expected: ["404", "409"] }));
+
+test("a link brings back what it was copied from", () =>
+  opened("#example=ellipse&operation=normals&arrows=true&range=full", async (page) => {
+    await settled(page);
+    assert.equal(await page.inputValue("[name=operation]"), "normals");
+    assert.ok(await page.isChecked("[name=arrows]"));
+    await page.selectOption("[name=operation]", "curvatures");
+    await settled(page);
+    await page.goBack();
+    await settled(page);
+    assert.equal(await page.inputValue("[name=operation]"), "normals");
+  }));
+
+test("a mesh and a picture are saved", () =>
+  opened("#example=sphere&operation=mesh", async (page) => {
+    await settled(page);
+    for (const [kind, start] of [["png", "\x89PNG"], ["ply", "ply"], ["glb", "glTF"]]) {
+      const [saved] = await Promise.all([page.waitForEvent("download"), page.click(`[data-save=${kind}]`)]);
+      const bytes = readFileSync(await saved.path());
+      assert.equal(bytes.subarray(0, start.length).toString("latin1"), start);
+    }
+  }));
+
+for (const [name, viewport, colorScheme] of [["desk", DESK, "light"], ["phone", PHONE, "light"], ["dark", DESK, "dark"]]) {
+  test(`axe finds nothing serious: ${name}`, () =>
+    opened("#example=sphere", async (page) => {
+      await settled(page);
+      // The policy forbids scripts of elsewhere; the debugger's are not in the page.
+      const found = await page.evaluate(`${axe}; axe.run()`);
+      const serious = found.violations.filter(({ impact }) => ["serious", "critical"].includes(impact));
+      assert.deepEqual(serious.map(({ id, nodes }) => [id, nodes[0].html]), []);
+      await page.screenshot({ path: `${pictures}/${name}.png`, fullPage: true });
+      const isWide = await page.evaluate(() => document.documentElement.scrollWidth > window.innerWidth);
+      assert.ok(!isWide, "the page is wider than the window");
+    }, { viewport, colorScheme }));
+}
