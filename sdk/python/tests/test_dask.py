@@ -22,8 +22,8 @@ import gramian.dask
 from gramian.dask.cells.cut import Cut
 from gramian.dask.cells.parts import Reach, distinct, join, look, rim, split
 from gramian.dask.surface import probe
-from gramian.replicas import Replicas
-from gramian.tiling import choose_coarse
+from gramian.tiles.operations import choose_coarse
+from gramian.tiles.replicas import Replicas
 from gramian.wire.tensors import Array
 
 NOWHERE = "http://127.0.0.1:9"
@@ -191,7 +191,7 @@ def test_a_replica_may_die(another: tuple[str, subprocess.Popen[str]], client: g
 
 
 def test_replicas_are_asked_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gramian.replicas.PAUSE_SECONDS", 0.0)
+    monkeypatch.setattr("gramian.tiles.replicas.PAUSE_SECONDS", 0.0)
     asked: list[str] = []
 
     def fails(client: gramian.Client) -> None:

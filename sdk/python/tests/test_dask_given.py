@@ -12,9 +12,9 @@ import pytest
 
 import gramian
 import gramian.dask
-from gramian import replicas
 from gramian.dask.cells import parts, plan
 from gramian.dask.cells.parts import Part, Reach, nearest
+from gramian.tiles import replicas
 from gramian.wire.tensors import Array
 
 

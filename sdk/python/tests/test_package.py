@@ -241,7 +241,12 @@ def test_so_does_a_batch_of_posteriors(client: gramian.Client) -> None:
             np.testing.assert_allclose(getattr(answer, name), getattr(single, name), rtol=1e-9, err_msg=name)
         assert answer.log_marginal_likelihoods[i] == pytest.approx(single.log_marginal_likelihood, rel=1e-9)
     plain = cloud.posterior_batch(values, queries, kernel=GAUSS)
-    assert [name for name, value in members(plain).items() if value is not None] == ["means", "diagnostics", "fit"]
+    assert [name for name, value in members(plain).items() if value is not None] == [
+        "positions",
+        "means",
+        "diagnostics",
+        "fit",
+    ]
 
 
 def assert_shapes(answer: object, **shapes: tuple[int, ...]) -> None:

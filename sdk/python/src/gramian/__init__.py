@@ -23,6 +23,7 @@ from .answers import (
     LaplaceBeltramiMatrix,
     LaplaceBeltramiSparseMatrix,
     LeaveOneOut,
+    Mesh,
     ModelSelection,
     Normals,
     Posterior,
@@ -34,6 +35,7 @@ from .answers import (
 from .arguments.fit import Fit, Geometry, GeometryFields, GeometryLike, Kernel, KernelFields, KernelLike, ValuesFit
 from .arguments.options import (
     InterpolationOptions,
+    MeshOptions,
     OperatorFit,
     OperatorOptions,
     PosteriorOptions,
@@ -42,7 +44,8 @@ from .arguments.options import (
     SurfaceOptions,
 )
 from .client import Client
-from .cloud import Cloud
+from .local import local
+from .resources.cloud import Cloud
 from .resources.selection import Bounds, FreeParameterFields, Vary
 from .rest.models import (
     Degenerate,
@@ -56,6 +59,9 @@ from .rest.models import (
     KernelDescription,
     KernelFamily,
     KernelUsed,
+    MeshInclude,
+    MeshPart,
+    MeshQuality,
     OrientationChoice,
     PosteriorQuantity,
     SelectionCriterion,
@@ -107,6 +113,11 @@ __all__ = [
     "LaplaceBeltramiMatrix",
     "LaplaceBeltramiSparseMatrix",
     "LeaveOneOut",
+    "Mesh",
+    "MeshInclude",
+    "MeshOptions",
+    "MeshPart",
+    "MeshQuality",
     "ModelSelection",
     "Normals",
     "NotPositiveDefinite",
@@ -137,4 +148,5 @@ __all__ = [
     "ValuesFit",
     "Vary",
     "WarningCode",
+    "local",
 ]

@@ -19,7 +19,7 @@ from .arguments.fit import Whole
 from .arguments.keywords import suggest_names
 from .arguments.normalise import CLIENT, REQUEST, normalise
 from .arguments.registration import register, register_file
-from .cloud import Cloud
+from .resources.cloud import Cloud
 from .rest.models import CloudList, Job, KernelDescription, KernelList, Version
 from .wire.connection import Connection
 from .wire.problems import Problem

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from .answers import Posterior
 from .arguments.fit import Duplicates, KernelLike, Mean, Number, Quantity, Solver
 from .client import Client
-from .cloud import Cloud
+from .resources.cloud import Cloud
 from .rest.models import KernelUsed, SolverUsed
 from .rest.types import Unset
 from .wire.problems import NotPositiveDefinite, Problem

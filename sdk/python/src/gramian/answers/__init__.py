@@ -10,6 +10,7 @@ pickled and used by several threads. `repr` shows arrays by their shapes.
 
 from .answer import Answer
 from .batches import InterpolationBatch, PosteriorBatch
+from .mesh import Mesh
 from .operators import (
     LaplaceBeltrami,
     LaplaceBeltramiMatrix,
@@ -32,6 +33,7 @@ __all__ = [
     "LaplaceBeltramiMatrix",
     "LaplaceBeltramiSparseMatrix",
     "LeaveOneOut",
+    "Mesh",
     "ModelSelection",
     "Normals",
     "Posterior",

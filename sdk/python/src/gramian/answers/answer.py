@@ -9,13 +9,16 @@ from typing import Any, Self
 import numpy as np
 
 from ..arguments.describe import described
-from ..rest.models import Degenerate, Diagnostics, FamilyScore, KernelUsed, SurfaceUsed
-from ..wire.tensors import Members
+from ..rest.models import Degenerate, Diagnostics, FamilyScore, KernelUsed, MeshPart, SurfaceUsed
+from ..wire.tensors import Array, Members
+from .html import page_of
 
 OBJECTS: Mapping[str, Callable[[Any], object]] = {
     "diagnostics": Diagnostics.from_dict,
     "kernel": KernelUsed.from_dict,
     "degenerate": lambda entries: tuple(map(Degenerate.from_dict, entries)),
+    "parts": lambda parts: tuple(map(MeshPart.from_dict, parts)),
+    "dropped_parts": lambda parts: tuple(map(MeshPart.from_dict, parts)),
     "families": lambda entries: tuple(map(FamilyScore.from_dict, entries)),
     "surfaces": lambda names: tuple(map(SurfaceUsed, names)),
 }
@@ -24,12 +27,25 @@ OBJECTS: Mapping[str, Callable[[Any], object]] = {
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Answer:
-    """The base class of all answers. `repr` shows arrays by their shapes, and leaves out absent members."""
+    """The base class of all answers. `repr` shows arrays by their shapes, and leaves out absent members.
+
+    Attributes
+    ----------
+    positions
+        `[m, d]`, L. The queries, or without them the points. None if the client has no copy of the points.
+    """
+
+    positions: Array | None = None
 
     def __repr__(self) -> str:
-        # `fit` is left out, because it repeats the diagnostics and the request.
-        members = {name: value for name, value in vars(self).items() if name != "fit"}
-        return described(type(self).__name__, members)
+        return described(type(self).__name__, self._shown())
+
+    def _repr_html_(self) -> str:
+        return page_of(type(self).__name__, self._shown())
+
+    def _shown(self) -> dict[str, object]:
+        # `fit` is left out, because it repeats the diagnostics and the request, and so do positions.
+        return {name: value for name, value in vars(self).items() if name not in ("fit", "positions")}
 
     @classmethod
     def read(cls, members: Members, **derived: object) -> Self:
@@ -51,3 +67,11 @@ def _member(members: Members, name: str) -> object:
     if name in OBJECTS:
         return OBJECTS[name](members[name])
     return members.array(name) if isinstance(members[name], np.ndarray | list) else members[name]
+
+
+def numbers_of(answer: Answer, n_rows: int) -> dict[str, Array]:
+    """Returns the arrays of an answer that have a row for each of its positions or vertices, by name."""
+    rows = {
+        name: value for name, value in vars(answer).items() if isinstance(value, np.ndarray) and name != "positions"
+    }
+    return {name: array for name, array in rows.items() if array.dtype == np.float64 and len(array) == n_rows}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 from ..arguments.fit import ValuesFit
 from ..rest.models import Diagnostics, FamilyScore, KernelUsed
@@ -110,3 +110,9 @@ class ModelSelection(Answer):
         left_out = Members({}, members["leave_one_out"], members.request)
         parts = {"path": AlphaPath.read(members), "leave_one_out": LeaveOneOut.read(left_out)}
         return super().read(members, fit=selected_fit(members), **parts, **derived)
+
+    def plot(self, ax: Any = None) -> Any:  # noqa: ANN401 (Axes, LikelihoodDisplay)
+        """Draws the criterion over α, with the selected one."""
+        from ..plot import LikelihoodDisplay
+
+        return LikelihoodDisplay.from_answer(self).plot(ax)

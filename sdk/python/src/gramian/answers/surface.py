@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Literal, Self
 
 from ..arguments.options import SurfaceFit
 from ..rest.models import Degenerate, Diagnostics, SurfaceUsed
 from ..wire.tensors import Array, Members
-from .answer import Answer
+from .answer import Answer, numbers_of
 from .fit import surface_fit_used
 
 
@@ -19,6 +19,49 @@ class SurfaceAnswer(Answer):
     def read(cls, members: Members, **derived: object) -> Self:
         """Reads an answer and the options of its fit."""
         return super().read(members, fit=surface_fit_used(members), **derived)
+
+    def plot(
+        self,
+        quantity: str | None = None,
+        *,
+        positions: Array | None = None,
+        backend: Literal["matplotlib", "pyvista"] = "matplotlib",
+        **looks: Any,  # noqa: ANN401 (of SurfaceDisplay.plot)
+    ) -> Any:  # noqa: ANN401 (a SurfaceDisplay, or a Plotter of pyvista)
+        """Draws the points, coloured by a quantity: the mean curvatures, or else the norms of gradients.
+
+        Parameters
+        ----------
+        quantity : str, optional
+            Name of a member, such as `"gaussian_curvatures"`.
+        positions : array_like, `[m, d]`, optional
+            The queries, if the client has no copy of them.
+        backend : str, optional
+            `"pyvista"` for a picture that can be turned (extra `pyvista`). `"matplotlib"` if absent.
+        **looks
+            Options of `gramian.plot.SurfaceDisplay.plot`.
+
+        Returns
+        -------
+        SurfaceDisplay or pyvista.Plotter
+            With pyvista, `show()` shows it.
+        """
+        from ..plot import SurfaceDisplay
+        from ..plot.surfaces import shown_by_pyvista
+
+        display = SurfaceDisplay.from_answer(self, quantity, positions)
+        if backend == "matplotlib":
+            return display.plot(**looks)
+        return shown_by_pyvista(self.to_pyvista(positions), quantity)
+
+    def to_pyvista(self, positions: Array | None = None) -> Any:  # noqa: ANN401 (PolyData)
+        """Returns the points with the numbers of the answer as a `pyvista.PolyData`."""
+        from ..plot.surfaces import to_pyvista
+
+        places = self.positions if positions is None else positions
+        if places is None:
+            raise ValueError("the positions are not known: give them, as to_pyvista(points)")
+        return to_pyvista(places, None, numbers_of(self, len(places)))
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 from ..arguments.fit import ValuesFit
 from ..rest.models import Diagnostics
@@ -96,3 +96,19 @@ class Posterior(ValuesAnswer):
     log_marginal_likelihood: float | None = None
     diagnostics: Diagnostics
     fit: ValuesFit
+
+    def plot(self, places: Array | None = None, ax: Any = None, **looks: Any) -> Any:  # noqa: ANN401 (PosteriorDisplay)
+        """Draws the mean along a line, with a band in which the function is with 95 % if there are variances.
+
+        Parameters
+        ----------
+        places : array_like, `[m]`, optional
+            Where the queries are along the line. By the way from the first to each, if absent.
+        ax : matplotlib.axes.Axes, optional
+            Where to draw. New axes if absent.
+        **looks
+            Options of `gramian.plot.PosteriorDisplay.plot`.
+        """
+        from ..plot import PosteriorDisplay
+
+        return PosteriorDisplay.from_answer(self, places).plot(ax, **looks)

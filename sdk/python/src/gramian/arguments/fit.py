@@ -17,6 +17,8 @@ from ..rest.models import (
     KernelFamily,
     KernelUsed,
     MeanChoice,
+    MeshInclude,
+    MeshQuality,
     OrientationChoice,
     PosteriorQuantity,
     SolverChoice,
@@ -46,6 +48,8 @@ Solver: TypeAlias = SolverChoice | SolverUsed | Literal["auto", "dense", "local"
 Duplicates: TypeAlias = DuplicatePolicy | Literal["refuse", "merge"]
 Surface: TypeAlias = SurfaceChoice | Literal["auto", "signature", "offset", "local"]
 Deviations: TypeAlias = GeometryInclude | Literal["deviations"]
+MeshWord: TypeAlias = MeshInclude | Literal["curvatures", "deviations"]
+Quality: TypeAlias = MeshQuality | Literal["regular", "raw"]
 Mean: TypeAlias = MeanChoice | Literal["zero", "constant", "linear"]
 Orientation: TypeAlias = OrientationChoice | Literal["outward", "gradient"]
 Quantity: TypeAlias = (

@@ -33,6 +33,8 @@ from ..rest.models import (
     KernelDescription,
     KernelFamily,
     MeanChoice,
+    MeshInclude,
+    MeshQuality,
     OrientationChoice,
     PosteriorQuantity,
     SelectionCriterion,
@@ -60,7 +62,7 @@ def normalise(
     fields
         The given values, by name.
     rules
-        A rule for each existing field: `REQUEST`, `GEOMETRIC`, `BATCH`, `KERNEL`, `GEOMETRY`, `CLIENT`.
+        A rule for each existing field: `REQUEST`, `GEOMETRIC`, `MESH`, `BATCH`, `KERNEL`, `GEOMETRY`, `CLIENT`.
     sizes
         The known lengths of the axes of arrays, by name: n points, d coordinates.
     path
@@ -130,8 +132,8 @@ def with_deviations(fields: Mapping[str, object]) -> dict[str, object]:
     deviations, include = fields.get("deviations"), fields.get("include")
     if _is_absent(deviations) or not as_truth("deviations", deviations):
         return others
-    wanted = [] if _is_absent(include) else as_words("include", include, GeometryInclude)
-    return {**others, "include": list(dict.fromkeys([*wanted, GeometryInclude.DEVIATIONS.value]))}
+    wanted = [] if _is_absent(include) else as_words("include", include, MeshInclude)
+    return {**others, "include": list(dict.fromkeys([*wanted, MeshInclude.DEVIATIONS.value]))}
 
 
 def samples(name: str, value: object, sizes: Sizes) -> dict[str, object]:
@@ -160,6 +162,17 @@ def bounds(name: str, value: object, sizes: Sizes) -> dict[str, float]:  # noqa:
     """Applies the rule for bounds: the least and the greatest value."""
     least, greatest = as_array(name, value, ["bounds"], {"bounds": 2}).tolist()
     return {"min": least, "max": greatest}
+
+
+def box(name: str, value: object, sizes: Sizes) -> dict[str, object]:
+    """Applies the rule for boxes: the least and the greatest coordinates, a row each."""
+    least, greatest = as_array(name, value, ["corners", "d"], {**sizes, "corners": 2})
+    return {"min": least, "max": greatest}
+
+
+def truth(name: str, value: object, sizes: Sizes) -> bool:  # noqa: ARG001
+    """Applies the rule for true or false."""
+    return as_truth(name, value)
 
 
 def vary(name: str, value: object, sizes: Sizes) -> list[dict[str, object]]:
@@ -291,6 +304,17 @@ REQUEST: Mapping[str, Rule] = {
 
 GEOMETRIC: Mapping[str, Rule] = {**REQUEST, "include": words(*GeometryInclude)}
 """Rules for normals and curvatures, and for values and operators that may have deviations."""
+
+MESH: Mapping[str, Rule] = {
+    **REQUEST,
+    "include": words(*MeshInclude),
+    "level": number,
+    "step": number,
+    "bounds": box,
+    "quality": word(*MeshQuality),
+    "open": truth,
+}
+"""Rules for meshes."""
 
 BATCH: Mapping[str, Rule] = {**REQUEST, "values": array("k", "n")}
 """Rules for many lists of values."""

@@ -11,7 +11,20 @@ from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy.typing as npt
 
-from .fit import Deviations, Fit, GeometryLike, Number, Orientation, Quantity, Surface, ValuesFit, Whole
+from .fit import (
+    Deviations,
+    Fit,
+    GeometryLike,
+    Mean,
+    MeshWord,
+    Number,
+    Orientation,
+    Quality,
+    Quantity,
+    Surface,
+    ValuesFit,
+    Whole,
+)
 
 if TYPE_CHECKING:
     from ..rest.models import Hyperparameters
@@ -112,6 +125,45 @@ class SurfaceOptions(DeviationOptions, SurfaceFit, total=False):
 
     surface: Surface | None
     orientation: Orientation | None
+
+
+class MeshOptions(SurfaceFit, total=False):
+    """Options of meshes.
+
+    Keys
+    ----
+    surface : str, optional
+        `"signature"` or `"local"` to allow only that function. `"auto"` if absent.
+    orientation : str, optional
+        `"outward"` (if absent), or `"gradient"` for the side given by the gradient of u.
+    mean : str, optional
+        Mean of the function through values: `"zero"`, `"constant"` or `"linear"`. A constant if absent, or
+        zero if `kernel` is given.
+    step : float, optional
+        Longest edge of the lattice that follows the surface, L. The median spacing of the points if absent.
+    bounds : array_like, `[2, d]`, optional
+        Box that the surface is followed in, its least and greatest coordinates, L. Where the cloud is if
+        absent.
+    quality : str, optional
+        `"regular"` (if absent) for nearly equilateral triangles, `"raw"` for those that the lattice cuts.
+    open : bool, optional
+        True for a surface that ends where its points end. False if absent: a closed mesh bridges holes.
+    include : str or several, optional
+        What else is known of the vertices: `"curvatures"`, `"deviations"` of positions, normals and
+        curvatures. Nothing if absent.
+    deviations : bool, optional
+        True for standard deviations, as by `include="deviations"`.
+    """
+
+    surface: Surface | None
+    orientation: Orientation | None
+    mean: Mean | None
+    step: Number | None
+    bounds: npt.ArrayLike | None
+    quality: Quality | None
+    open: bool | None
+    include: MeshWord | Iterable[MeshWord] | None
+    deviations: bool | None
 
 
 class OperatorOptions(DeviationOptions, OperatorFit, total=False):

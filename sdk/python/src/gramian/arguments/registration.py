@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import NoReturn, TypeVar
+
+import numpy as np
 
 from ..rest import models
 from ..wire.connection import Connection
 from ..wire.problems import UnknownCloud
-from ..wire.tensors import JSON, PLY, Array, Members
+from ..wire.tensors import JSON, PLY, Array
 from ..wire.transport import about
 from .normalise import REQUEST, Rule, normalise, with_deviations
 
@@ -74,9 +77,7 @@ class RegisteredCloud:
         except UnknownCloud:
             return
 
-    def _compute(
-        self, read: Callable[[Members], T], path: str, rules: Mapping[str, Rule] = REQUEST, **fields: object
-    ) -> T:
+    def _compute(self, read: Callable[..., T], path: str, rules: Mapping[str, Rule] = REQUEST, **fields: object) -> T:
         """Computes something about this cloud, and possibly the surface of another one.
 
         If the service has forgotten a cloud, both are posted again if their points or files are available.
@@ -84,12 +85,13 @@ class RegisteredCloud:
         """
         sizes = {"n": self.n_points, "d": self.dimension}
         request = {"cloud": {"id": self.id}, **normalise(with_deviations(fields), rules, sizes)}
+        placed = partial(read, positions=_read_only(request.get("queries", self._points)))
         try:
-            return self._connection.compute(path, request, read, self.id)
+            return self._connection.compute(path, request, placed, self.id)
         except UnknownCloud:
             if not self._post_again(self, _cloud_of(fields.get("geometry"))):
                 raise
-        return self._connection.compute(path, request, read, self.id)
+        return self._connection.compute(path, request, placed, self.id)
 
     def _post_again(self, *clouds: RegisteredCloud | None) -> bool:
         """Posts the clouds whose points or file are available. Returns true if there was one."""
@@ -131,3 +133,12 @@ def register_file(connection: Connection, file: bytes, cloud_id: str | None = No
     headers = {"Content-Type": PLY, "Accept": JSON, **about(cloud_id)}
     response = connection.send("POST", "/v1/clouds", content=file, headers=headers)
     return connection.read(models.Cloud.from_dict, response)
+
+
+def _read_only(array: object) -> Array | None:
+    """Returns a view of an array that cannot be written to, as all arrays of answers."""
+    if not isinstance(array, np.ndarray):
+        return None
+    view = array.view()
+    view.flags.writeable = False
+    return view

@@ -13,7 +13,7 @@ the nearest neighbours of its points beyond its sides, and with what the service
 that answers are those of one request for all points. Which side is outward one coarse cloud says for all tiles.
 """
 
-from ..replicas import Replicas
+from ..tiles.replicas import Replicas
 from .answers import Curvatures, Interpolation, Normals, SparseOperator
 from .service import Service, connect
 from .tiles import Tiles

@@ -11,10 +11,10 @@ import numpy as np
 from ..answers import Interpolation
 from ..arguments.fit import Kernel, ValuesFit
 from ..client import Client
-from ..replicas import Replicas
 from ..rest.models import KernelUsed
 from ..rest.types import Unset
-from ..tiling import choose_coarse
+from ..tiles.operations import choose_coarse
+from ..tiles.replicas import Replicas
 from ..wire.tensors import Array
 from .cells.graph import Rows
 from .cells.parts import Part, Reach, join

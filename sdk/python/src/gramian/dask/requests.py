@@ -10,8 +10,8 @@ from scipy.sparse import csr_matrix
 
 from ..answers import Curvatures, Normals
 from ..client import Client
-from ..replicas import Replicas
 from ..rest.models import Degenerate
+from ..tiles.replicas import Replicas
 from ..wire.tensors import Array
 from .cells.cut import Ints
 from .cells.graph import Rows

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from ..arguments.blocks import rows_of
 from ..arguments.keywords import suggest_names
 from ..client import DEFAULT_URL
-from ..replicas import Replicas
+from ..tiles.replicas import Replicas
 from .tiles import Tiles
 
 TILE_POINTS = 250_000

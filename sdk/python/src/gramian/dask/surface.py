@@ -18,9 +18,9 @@ import numpy as np
 
 from ..arguments.fit import Fit
 from ..client import Client
-from ..replicas import Replicas
 from ..rest.models import Hyperparameters
-from ..tiling import choose_coarse, choose_sides, find_regions
+from ..tiles.operations import choose_coarse, choose_sides, find_regions
+from ..tiles.replicas import Replicas
 from ..wire.tensors import Array
 from .cells import graph
 from .cells.cut import Ints

@@ -11,8 +11,8 @@ from scipy.sparse import csr_matrix
 from ..arguments.blocks import aligned, rows_of
 from ..arguments.fit import KernelLike, Mean, Number, ValuesFit
 from ..arguments.keywords import suggest_names
-from ..replicas import Replicas
 from ..rest.models import Hyperparameters
+from ..tiles.replicas import Replicas
 from . import answers, requests
 from .cells import graph
 from .cells.plan import Plan

@@ -6,10 +6,11 @@ from typing import Unpack
 
 import numpy.typing as npt
 
-from ..answers import Curvatures, Normals
+from ..answers import Curvatures, Mesh, Normals
+from ..arguments.fit import Number
 from ..arguments.keywords import suggest_names
-from ..arguments.normalise import GEOMETRIC
-from ..arguments.options import SurfaceOptions
+from ..arguments.normalise import GEOMETRIC, MESH
+from ..arguments.options import MeshOptions, SurfaceOptions
 from ..arguments.registration import RegisteredCloud
 
 
@@ -89,3 +90,37 @@ class SurfaceOfCloud(RegisteredCloud):
         (array([0.202]), array([0.004]))
         """
         return self._compute(Curvatures.read, "/v1/curvatures", GEOMETRIC, queries=queries, **options)
+
+    def level_set(
+        self, values: npt.ArrayLike | None = None, level: Number | None = None, **options: Unpack[MeshOptions]
+    ) -> Mesh:
+        """Meshes the surface that the points sample, or a level of the function through values.
+
+        The mesh is a manifold, and closed wherever `bounds` does not cut it. `gramian.MeshOptions` describes the
+        options.
+
+        Parameters
+        ----------
+        values : array_like, `[n]`, optional
+            A number for each point, V. A level of the function through them is meshed instead of the surface.
+        level : float, optional
+            The level of that function, V. The median of the values if absent.
+
+        Returns
+        -------
+        Mesh
+            `vertices`, `cells`, `normals` and what each vertex rests on, `support`. Curvatures and standard
+            deviations if requested.
+
+        Examples
+        --------
+        >>> angles = np.arange(64) * np.pi / 32
+        >>> circle = gramian.Client().cloud(5 * np.column_stack([np.cos(angles), np.sin(angles)]))
+        >>> mesh = circle.level_set(include="curvatures")
+        >>> (part,) = mesh.parts
+        >>> part.euler_characteristic, round(part.area, 1), mesh.mean_curvatures.mean().round(2)
+        (0, 31.4, np.float64(0.2))
+        """
+        # The rules do not let values be absent where they are named.
+        given = {} if values is None else {"values": values}
+        return self._compute(Mesh.read, "/v1/level-set", MESH, level=level, **given, **options)

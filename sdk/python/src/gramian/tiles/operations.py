@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from .arguments.fit import Fit
-from .arguments.normalise import REQUEST, Rule
-from .client import Client
-from .cloud import Cloud
-from .rest.models import CoarseResponse, Hyperparameters, SidesResponse
-from .wire.tensors import JSON, Array, Integers, Members
+from ..arguments.fit import Fit
+from ..arguments.normalise import REQUEST, Rule
+from ..client import Client
+from ..resources.cloud import Cloud
+from ..rest.models import CoarseResponse, Hyperparameters, SidesResponse
+from ..wire.tensors import JSON, Array, Integers, Members
 
 REGIONS: Mapping[str, Rule] = {
     **REQUEST,
@@ -35,7 +35,7 @@ def find_regions(
 ) -> tuple[Integers, dict[str, Any]]:
     """Finds the regions of a tile: the region of each point, `[n]`, and what is said of the regions."""
 
-    def read(members: Members) -> tuple[Integers, dict[str, Any]]:
+    def read(members: Members, **_: object) -> tuple[Integers, dict[str, Any]]:
         regions = {name: members[name] for name in ("regions", "borders", "n_edges")}
         return np.asarray(members["labels"], dtype=np.int64), regions
 

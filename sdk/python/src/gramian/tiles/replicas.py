@@ -12,8 +12,8 @@ from typing import TypeVar
 
 import httpx
 
-from .client import Client
-from .wire.problems import Overloaded, Problem
+from ..client import Client
+from ..wire.problems import Overloaded, Problem
 
 T = TypeVar("T")
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from .resources.batches import BatchesOnCloud
-from .resources.operators import OperatorsOnCloud
-from .resources.selection import SelectionOnCloud
-from .resources.surface import SurfaceOfCloud
-from .resources.values import ValuesOfCloud
+from .batches import BatchesOnCloud
+from .operators import OperatorsOnCloud
+from .selection import SelectionOnCloud
+from .surface import SurfaceOfCloud
+from .values import ValuesOfCloud
 
 
 class Cloud(ValuesOfCloud, BatchesOnCloud, SelectionOnCloud, SurfaceOfCloud, OperatorsOnCloud):

@@ -1,0 +1,1 @@
+"""What clouds in tiles need of the service: several replicas, and operations of their own."""

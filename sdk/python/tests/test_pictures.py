@@ -1,0 +1,140 @@
+"""Meshes, pictures of answers, and services of one's own."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+import trimesh
+
+import gramian
+from gramian.plot import LevelSetDisplay, LikelihoodDisplay, PosteriorDisplay, SurfaceDisplay
+from gramian.plot.splats import camera, splatted
+
+mpl.use("Agg")
+
+GOLDEN = np.pi * (3 - np.sqrt(5))
+
+
+def sphere(n: int) -> Any:
+    """Returns points spread over the unit sphere."""
+    z = 1 - (2 * np.arange(n) + 1) / n
+    across, angle = np.sqrt(1 - z * z), GOLDEN * np.arange(n)
+    return np.column_stack([across * np.cos(angle), across * np.sin(angle), z])
+
+
+@pytest.fixture(scope="module")
+def cloud() -> Any:
+    return gramian.Client().cloud(sphere(400))
+
+
+@pytest.fixture(scope="module")
+def mesh(cloud: Any) -> gramian.Mesh:
+    found: gramian.Mesh = cloud.level_set(include="curvatures", deviations=True)
+    return found
+
+
+def test_a_mesh_is_closed_and_knows_its_errors(mesh: gramian.Mesh) -> None:
+    (part,) = mesh.parts
+    assert (part.euler_characteristic, part.n_boundary_edges, mesh.dropped_parts) == (2, 0, ())
+    assert mesh.cells.shape == (part.n_cells, 3)
+    assert mesh.cells.dtype == np.int64
+    assert set(mesh.support) == {"observed"}
+    assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - 1).max() < 0.01
+    for array in (mesh.mean_curvatures, mesh.position_deviations, mesh.normal_deviations):
+        assert array is not None
+        assert array.shape == (part.n_vertices,)
+
+
+@pytest.mark.parametrize("ending", ["ply", "glb", "obj"])
+def test_a_mesh_is_saved_and_read_by_trimesh(mesh: gramian.Mesh, tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"sphere.{ending}"
+    mesh.save(path)
+    found = trimesh.load(path, force="mesh", process=False)
+    assert found.faces.shape == mesh.cells.shape
+    assert found.is_watertight
+    assert found.volume == pytest.approx(4 / 3 * np.pi, rel=0.05)
+
+
+def test_what_cannot_be_saved_is_refused_by_name(mesh: gramian.Mesh) -> None:
+    with pytest.raises(ValueError, match=r"\.ply, \.glb or \.obj"):
+        mesh.save("mesh.docx")
+    angles = np.arange(30) * np.pi / 15
+    polyline = gramian.Client().cloud(np.column_stack([np.cos(angles), np.sin(angles)])).level_set()
+    with pytest.raises(ValueError, match="segments"):
+        polyline.to_trimesh()
+
+
+def test_a_level_of_values_is_a_mesh() -> None:
+    points = np.stack(np.meshgrid(*[np.linspace(-1, 1, 12)] * 2), axis=-1).reshape(-1, 2)
+    square = gramian.Client().cloud(points)
+    found = square.level_set((points**2).sum(axis=1), 0.25, kernel="gauss")
+    assert np.abs(np.linalg.norm(found.vertices, axis=1) - 0.5).max() < 0.01
+    assert found.closedness is None
+    assert isinstance(found.plot(), LevelSetDisplay)
+
+
+def test_answers_draw_themselves(cloud: Any, mesh: gramian.Mesh) -> None:
+    curvatures = cloud.curvatures(deviations=True)
+    assert np.shares_memory(curvatures.positions, cloud.points)
+    display = curvatures.plot()
+    assert isinstance(display, SurfaceDisplay)
+    assert display.figure_ is display.axes_.figure
+    assert (display.mappable_.norm.vmin, display.axes_.get_title()) == (-display.mappable_.norm.vmax, "mean curvatures")
+    assert mesh.plot("position_deviations").axes_.get_title() == "position deviations"
+    assert cloud.normals([[1.0, 0, 0], [0, 1.0, 0]]).plot().positions.shape == (2, 3)
+    with pytest.raises(ValueError, match="no such_thing"):
+        curvatures.plot("such_thing")
+
+
+def test_posteriors_and_likelihoods_are_lines() -> None:
+    x = np.linspace(0, 6, 20)
+    line = gramian.Client().cloud(x[:, None])
+    values = np.sin(x)
+    posterior = line.posterior(values, [[1.0], [2.0]], include="variance", kernel="gauss", alpha=1e-4).plot()
+    assert isinstance(posterior, PosteriorDisplay)
+    assert posterior.places.tolist() == [1.0, 2.0]
+    assert isinstance(line.select_model(values, families="gauss").plot(), LikelihoodDisplay)
+
+
+def test_positions_that_are_not_known_are_asked_for(tmp_path: Path) -> None:
+    path = tmp_path / "sphere.ply"
+    head = (
+        "ply\nformat ascii 1.0\nelement vertex 100\nproperty double x\nproperty double y\nproperty double z\nend_header"
+    )
+    np.savetxt(path, sphere(100), header=head, comments="")
+    normals = gramian.Client().cloud(path).normals()
+    with pytest.raises(ValueError, match="positions=points"):
+        normals.plot()
+    assert normals.plot(positions=sphere(100)).positions.shape == (100, 3)
+
+
+def test_a_notebook_shows_a_table_and_a_histogram(cloud: Any) -> None:
+    page = cloud.curvatures()._repr_html_()
+    assert page.startswith("<b>Curvatures</b><table>")
+    assert "mean_curvatures" in page
+    assert "<svg" in page
+
+
+def test_the_nearer_disc_hides_the_other() -> None:
+    places = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [3.0, 0.0, 0.0]])
+    image, extent = splatted(places, np.eye(3), 0.5, 80)
+    middle = image.shape[0] // 2
+    assert image[middle, 10, :3].tolist() == [0, 1, 0]
+    assert image[middle, 70, :3].tolist() == [0, 0, 1]
+    assert image[middle, 40, 3] == 0
+    assert extent[0] == -0.5
+    assert np.allclose(camera(20, 50) @ camera(20, 50).T, np.eye(3))
+
+
+@pytest.mark.skipif("GRAMIAN_BINARY" not in os.environ, reason="there is no program to start")
+def test_a_service_of_ones_own_ends_with_its_block() -> None:
+    with gramian.local() as client:
+        assert client.version().name == "gramian"
+        assert client.cloud(sphere(20)).n_points == 20
+    with pytest.raises(FileNotFoundError, match="no program"), gramian.local("/nowhere/gramian"):
+        pass
