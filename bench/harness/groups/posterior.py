@@ -106,7 +106,9 @@ def new_values(setting: Setting, server: Server, n: int) -> Row:
         f"`solve` stage, residual included; reference: the triangle read twice at {bytes_per_second / 1e9:.1f} GB/s, "
         f"the rate of OpenBLAS ddot over 512 MiB; the request {min(answer.seconds for answer in answers) * 1e3:.1f} ms"
     )
-    return Row(f"new values, n = {n:,}: the solve", Figure.of(times["ours"]), Figure(streamed.best * 1e3, "ms"), NEW_VALUES, remark)
+    return Row(
+        f"new values, n = {n:,}: the solve", Figure.of(times["ours"]), Figure(streamed.best * 1e3, "ms"), NEW_VALUES, remark
+    )
 
 
 def one_query(client: Client, n: int) -> dict[str, Any]:

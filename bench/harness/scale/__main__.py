@@ -1,6 +1,7 @@
 """The command line of `bench/scale`."""
 
 import argparse
+import fnmatch
 import json
 import os
 import subprocess
@@ -16,6 +17,7 @@ from ..report import significant
 from ..setting import N_THREADS, Setting
 from . import growth
 from .data import Dragon, describe
+from .level_sets import LevelSets
 from .peers import Peers
 from .report import OURS, Entry, Measured, Work, markdown, plain
 from .service import NotServed, Service, use_cores
@@ -33,16 +35,14 @@ def main() -> None:
     setting = Setting(ROOT, arguments.quick, with_gpytorch=False)
     fields = {"solver": arguments.solver} if arguments.solver else {}
     service = Service(setting, arguments.binary, fields)
-    table = Table(setting, service, Peers(setting, arguments.cached_peers), Dragon(setting.build / "scale"))
-    works = table.works()
-    if unknown := set(arguments.row) - {*works, "growth"}:
-        sys.exit(f"no such row: {', '.join(sorted(unknown))}; there are {', '.join(works)}, growth")
-    chosen = arguments.row or [*works, "growth"]
+    peers, dragon = Peers(setting, arguments.cached_peers), Dragon(setting.build / "scale")
+    works = {**Table(setting, service, peers, dragon).works(), **LevelSets(setting, service, peers, dragon).works()}
+    chosen = choose([*works, "growth"], arguments.row)
     busy = [machine.busy_cores()]
     rows = {name: measure(name, works[name](), arguments) for name in works if name in chosen}
     grown, refusal = grow(setting, service) if "growth" in chosen else ([], "not measured")
     busy.append(machine.busy_cores())
-    facts = describe_run(setting, service, table.dragon, busy)
+    facts = describe_run(setting, service, dragon, busy)
     write_json(facts, rows, grown)
     if not arguments.row and not arguments.quick:
         write_pages(facts, rows, grown, refusal, arguments.cached_peers)
@@ -51,6 +51,16 @@ def main() -> None:
         unserved.append("growth")
     if unserved:
         sys.exit(f"not served: {', '.join(unserved)}")
+    if arguments.strict and (short := [name for name, row in rows.items() if row.short]):
+        sys.exit(f"bounds do not hold: {', '.join(short)}")
+
+
+def choose(names: list[str], patterns: list[str]) -> list[str]:
+    """Returns the names that match a pattern, or all of them if there is none."""
+    for pattern in patterns:
+        if not fnmatch.filter(names, pattern):
+            sys.exit(f"no such row: {pattern}; there are {', '.join(names)}")
+    return [name for name in names if not patterns or any(fnmatch.fnmatch(name, pattern) for pattern in patterns)]
 
 
 def parse() -> argparse.Namespace:
@@ -62,7 +72,8 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--solver", help="added to every request that names none, to see what one does that `auto` leaves out")
     parser.add_argument("--no-peers", action="store_true", help="gramian alone")
     parser.add_argument("--cached-peers", action="store_true", help="peers are not run again on what they were run on before")
-    parser.add_argument("row", nargs="*", help="of the table, or growth; all if absent")
+    parser.add_argument("--strict", action="store_true", help="fails if a bound of a row does not hold")
+    parser.add_argument("row", nargs="*", help="of the table, or growth, or patterns such as 'mesh-*'; all if absent")
     return parser.parse_args()
 
 

