@@ -148,3 +148,15 @@ async fn meshes_of_values_follow_units_and_offsets() {
         }
     }
 }
+
+#[tokio::test]
+async fn a_curve_that_a_short_kernel_breaks_into_islands_is_warned_of() {
+    let server = Server::start().await;
+    let answer = server.post("/v1/level-set", &json!({"cloud": {"points": circle(400)}})).await.expect_ok();
+    assert!(!answer["dropped_parts"].as_array().unwrap().is_empty());
+    let warnings = answer["diagnostics"]["warnings"].as_array().unwrap();
+    assert!(warnings.iter().any(|warning| warning["code"] == "open_cloud"), "{warnings:?}");
+    let body = json!({"cloud": {"points": circle(400)}, "surface": "local"});
+    let whole = server.post("/v1/level-set", &body).await.expect_ok();
+    assert!((whole["parts"][0]["area"].as_f64().unwrap() - std::f64::consts::TAU).abs() < 0.01, "{whole}");
+}

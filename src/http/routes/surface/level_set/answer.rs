@@ -21,6 +21,9 @@ use gramian_numerics::surface::mesh::fields::interpolant::LevelOf;
 use gramian_numerics::surface::mesh::surface::{curvatures_of_level, mesh_of_level, mesh_of_surface};
 use gramian_numerics::surface::mesh::{Closedness, DOUBTFUL, LevelSet, Part, Support};
 
+/// Share of a level set that may be left out as small parts without a warning.
+const MUCH_DROPPED: f64 = 0.05;
+
 /// What was asked about the vertices of a mesh.
 #[derive(Default)]
 struct AtVertices {
@@ -153,6 +156,19 @@ fn warning_of_closedness(closedness: Closedness, is_open: bool) -> Option<Warnin
     Some(Warning { code: WarningCode::OpenCloud, detail })
 }
 
+/// Warns where much of a level set was left out, as where a short kernel makes a fine curve a row of islands.
+fn warning_of_dropped(parts: &[Part], dropped: &[Part]) -> Option<Warning> {
+    let area = |parts: &[Part]| parts.iter().map(|part| part.area).sum::<f64>();
+    let share = area(dropped) / (area(parts) + area(dropped));
+    (share > MUCH_DROPPED).then(|| {
+        let detail = format!(
+            "{:.0} % of the level set are small parts that were left out, so the mesh may lack most of the surface; ask for the surface local, or for a longer length scale",
+            100.0 * share
+        );
+        Warning { code: WarningCode::OpenCloud, detail }
+    })
+}
+
 fn answer(
     work: &LevelSetWork,
     meshed: Meshed,
@@ -165,6 +181,7 @@ fn answer(
         let detail = "regular triangles would have had another topology; these are raw".to_owned();
         diagnostics.warnings.push(Warning { code: WarningCode::RawMesh, detail });
     }
+    diagnostics.warnings.extend(warning_of_dropped(&parts, &dropped));
     let mut cells = mesh.cells;
     if is_turned(work) {
         normals.iter_mut().for_each(|c| *c = -*c);
