@@ -1,11 +1,20 @@
 //! Rules by which `auto` takes the local solver.
 
+use crate::kernel::defaults::Purpose;
 use crate::patches::MAX_LOCAL_DIMENSION;
 
 /// Number of points from which `auto` regresses a surface locally, unless kernel or α are given.
 ///
 /// The factorization alone would take more than a second.
 pub const LOCAL_FROM: usize = 5_000;
+
+/// Number of points from which `auto` regresses a curve of the plane locally, for its level set.
+///
+/// With the short kernel of level sets, the signature function of a finer curve exceeds its level only in a
+/// shell that is thinner than its dips between the points, and its level set is a row of islands: of 100
+/// points on a square or 200 on a circle. Local regressions mesh all curves that were tried from 100 points
+/// on, and of 50 all but those too coarse for any method.
+pub const LOCAL_CURVES_FROM: usize = 64;
 
 /// Reason why `auto` chose the local solver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,19 +25,27 @@ pub enum AutoLocal {
     ManyPoints,
     /// Standard deviations are requested, which only regressions have.
     Deviations,
+    /// The level set of a finely sampled curve is requested.
+    FineCurve,
 }
 
-/// Returns why a surface known only by its points is better regressed locally, or `None` if it is not.
-pub fn prefers_local(
-    n_points: usize,
-    dimension: usize,
-    max_dense_points: usize,
-    has_deviations: bool,
-) -> Option<AutoLocal> {
+/// A surface known only by its points, before it is fitted.
+#[derive(Debug, Clone, Copy)]
+pub struct UnfittedSurface {
+    pub n_points: usize,
+    pub dimension: usize,
+    pub purpose: Purpose,
+    pub has_deviations: bool,
+}
+
+/// Returns why a surface is better regressed locally, or `None` if it is not.
+pub fn prefers_local(surface: &UnfittedSurface, max_dense_points: usize) -> Option<AutoLocal> {
+    let UnfittedSurface { n_points, dimension, purpose, has_deviations } = *surface;
     match dimension {
         2..=MAX_LOCAL_DIMENSION if n_points > max_dense_points => Some(AutoLocal::BeyondDense),
         2..=MAX_LOCAL_DIMENSION if has_deviations => Some(AutoLocal::Deviations),
         2..=MAX_LOCAL_DIMENSION if n_points >= LOCAL_FROM => Some(AutoLocal::ManyPoints),
+        2 if purpose == Purpose::LevelSets && n_points >= LOCAL_CURVES_FROM => Some(AutoLocal::FineCurve),
         _ => None,
     }
 }

@@ -10,12 +10,14 @@ use common::random::Random;
 use gramian_numerics::error::NumericsError;
 use gramian_numerics::kernel::Family;
 use gramian_numerics::kernel::defaults::Purpose;
-use gramian_numerics::observer::Unobserved;
+use gramian_numerics::observer::{Observer, Unobserved};
 use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, Orientation, SurfaceModel};
+use gramian_numerics::surface::mesh::field::{Feet, Field};
 use gramian_numerics::surface::mesh::fields::interpolant::LevelOf;
 use gramian_numerics::surface::mesh::surface::{MeshOptions, mesh_of_level, mesh_of_surface};
-use gramian_numerics::surface::mesh::{Bounds, Quality, Support};
+use gramian_numerics::surface::mesh::{Bounds, LevelSetRequest, Quality, Support, level_set};
 use support::{OPTIONS, angles, assert_is_manifold, bunny, local, meshed, spacing_of, volume};
 
 const WITH_DEVIATIONS: GeometryRequest = GeometryRequest {
@@ -285,4 +287,74 @@ fn cancellation_is_honoured() {
     }
     let sphere = local(fibonacci_sphere(300));
     assert_eq!(mesh_of_surface(&sphere, &OPTIONS, &Gone).map(|_| ()), Err(NumericsError::Cancelled));
+}
+
+/// The unit sphere with a small sphere beside it: f = max(1 − |x|, 0.15 − |x − c|).
+struct SphereWithBubble;
+
+impl SphereWithBubble {
+    const BUBBLE: [f64; 3] = [0.0, 0.0, 1.25];
+
+    fn jet(x: &[f64]) -> (f64, Vec<f64>) {
+        let to_bubble: Vec<f64> = x.iter().zip(Self::BUBBLE).map(|(x, c)| x - c).collect();
+        let (of_sphere, of_bubble) = (1.0 - norm(x), 0.15 - norm(&to_bubble));
+        let (value, from_centre) =
+            if of_sphere > of_bubble { (of_sphere, x) } else { (of_bubble, &to_bubble[..]) };
+        (value, from_centre.iter().map(|c| c / norm(from_centre)).collect())
+    }
+}
+
+impl Field for SphereWithBubble {
+    fn dimension(&self) -> usize {
+        3
+    }
+
+    fn values_at_once(&self, places: &[f64], _: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
+        Ok(places.chunks_exact(3).map(|x| Self::jet(x).0).collect())
+    }
+
+    fn feet_at_once(&self, places: &[f64], _: &dyn Observer) -> Result<Feet, NumericsError> {
+        let mut feet = Feet::default();
+        for x in places.chunks_exact(3) {
+            let (value, normal) = Self::jet(x);
+            feet.positions.extend(x.iter().zip(&normal).map(|(x, c)| x + value * c));
+            feet.normals.extend(normal);
+            feet.distances.push(value.abs());
+        }
+        Ok(feet)
+    }
+
+    fn tolerance(&self) -> f64 {
+        1e-12
+    }
+}
+
+#[test]
+fn a_bubble_beside_a_surface_has_no_points_of_its_own_and_is_dropped() {
+    let mesh_over = |points: Vec<f64>| {
+        let cloud = Cloud::new(points, 3).unwrap();
+        let sampling = Sampling::of(&cloud, &Unobserved).unwrap();
+        let request = LevelSetRequest {
+            field: &SphereWithBubble,
+            sampling: &sampling,
+            seeds: [cloud.coordinates(), &[0.0, 0.0, 1.4]].concat(),
+            step: sampling.scales().spacing,
+            bounds: Bounds { min: vec![-2.0; 3], max: vec![2.0; 3] },
+            is_open: false,
+            quality: Quality::Regular,
+            max_nodes: 2_000_000,
+        };
+        level_set(&request, &Unobserved).unwrap()
+    };
+    let sphere = fibonacci_sphere(2000).coordinates().to_vec();
+    let found = mesh_over(sphere.clone());
+    // The bubble is a spacing and a quarter away from the points, and has the area of 40 of them.
+    assert_eq!((found.parts.len(), found.dropped.len()), (1, 1));
+    assert!((0.2..0.3).contains(&found.dropped[0].area), "{:?}", found.dropped);
+    // With points of its own it is a part.
+    let bubble = fibonacci_sphere(60);
+    let on_bubble =
+        bubble.points().flat_map(|x| [0.15 * x[0], 0.15 * x[1], 0.15 * x[2] + SphereWithBubble::BUBBLE[2]]);
+    let found = mesh_over(sphere.into_iter().chain(on_bubble).collect());
+    assert_eq!((found.parts.len(), found.dropped.len()), (2, 0));
 }

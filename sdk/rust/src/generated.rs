@@ -1732,7 +1732,8 @@ Absent for a level of values.*/
         pub closedness: ::std::option::Option<f64>,
         ///The numbers used, the method, its accuracy, and warnings.
         pub diagnostics: Diagnostics,
-        ///Parts that were left out: no point is near them, or they are smaller than six points' worth.
+        /**Parts that were left out: no point is near them, they have too few points of their own, or they
+are too small to mean anything.*/
         pub dropped_parts: ::std::vec::Vec<MeshPart>,
         ///Standard deviations of the mean curvatures, 1/length.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
@@ -3751,6 +3752,10 @@ mean. The diagnostics repeat all of it.*/
         NeighboursNotEnough,
         #[serde(rename = "raw_mesh")]
         RawMesh,
+        #[serde(rename = "parts_dropped")]
+        PartsDropped,
+        #[serde(rename = "bridged")]
+        Bridged,
         #[serde(rename = "misfit")]
         Misfit,
     }
@@ -3769,6 +3774,8 @@ mean. The diagnostics repeat all of it.*/
                 Self::FarFromCloud => f.write_str("far_from_cloud"),
                 Self::NeighboursNotEnough => f.write_str("neighbours_not_enough"),
                 Self::RawMesh => f.write_str("raw_mesh"),
+                Self::PartsDropped => f.write_str("parts_dropped"),
+                Self::Bridged => f.write_str("bridged"),
                 Self::Misfit => f.write_str("misfit"),
             }
         }
@@ -3791,6 +3798,8 @@ mean. The diagnostics repeat all of it.*/
                 "far_from_cloud" => Ok(Self::FarFromCloud),
                 "neighbours_not_enough" => Ok(Self::NeighboursNotEnough),
                 "raw_mesh" => Ok(Self::RawMesh),
+                "parts_dropped" => Ok(Self::PartsDropped),
+                "bridged" => Ok(Self::Bridged),
                 "misfit" => Ok(Self::Misfit),
                 _ => Err("invalid value".into()),
             }

@@ -88,6 +88,10 @@ pub enum WarningCode {
     NeighboursNotEnough,
     /// Regular triangles would have changed the topology of a mesh, so it has the raw ones.
     RawMesh,
+    /// Small parts of a level set were left out of its mesh.
+    PartsDropped,
+    /// A mesh goes on where there are no points.
+    Bridged,
     /// Values contradict kernel and noise, so deviations are too short. If the warning names a value, perhaps
     /// only around it.
     Misfit,

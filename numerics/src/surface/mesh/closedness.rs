@@ -61,11 +61,11 @@ impl Closedness {
         let Some(winding) = winding else { return Ok(Self { share: 0.0, is_turned: false, jump: 1.0 }) };
         let (n, d) = (cloud.n_points(), cloud.dimension());
         let points: Vec<usize> = (0..n).step_by((n / N_LOOKED_AT).max(1)).collect();
+        let most = OFF_AT_MOST * cloud.radius();
         let sides = |&point: &usize| {
             observer.checkpoint()?;
             let normal = &normals[point * d..][..d];
             let off = |spacings: f64| -> Small {
-                let most = OFF_AT_MOST * cloud.radius();
                 let length = (spacings * sampling.spacing(point)).clamp(-most, most);
                 cloud.point(point).iter().zip(normal).map(|(x, c)| x + length * c).collect()
             };

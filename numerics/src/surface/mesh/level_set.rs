@@ -1,16 +1,19 @@
 //! The whole way from a field to its mesh.
 
+use rayon::prelude::*;
+
 use super::Mesh;
 use super::field::{Feet, Field};
 use super::lattice::cut::cut;
 use super::lattice::follow::{Bounds, Region, follow};
 use super::lattice::nodes::Lattice;
-use super::lattice::roots::{crossed_edges, roots};
+use super::lattice::roots::Crossings;
 use super::parts::{Part, Parts};
 use super::regular::regular;
-use super::support::{Support, support};
+use super::support::{Support, nearest_points, observed, support};
 use crate::error::{NumericsError, Result};
 use crate::observer::{Observer, Stage};
+use crate::points::neighbours::Neighbour;
 use crate::points::sampling::Sampling;
 
 /// Shape of the triangles.
@@ -114,6 +117,13 @@ fn settled(mut mesh: Mesh, field: &dyn Field, enough: f64, observer: &dyn Observ
     Ok((mesh, feet))
 }
 
+/// Part of the difference of f along an edge of the lattice up to which a vertex counts as found. Newton's
+/// steps with the gradient, which follow for all vertices, are then exact.
+const PRECISION_OF_RAW: f64 = 1e-4;
+
+/// The same for vertices that are moved along the surface and back onto it anyway.
+const PRECISION_OF_REGULAR: f64 = 0.05;
+
 fn raw_mesh(request: &LevelSetRequest<'_>, observer: &dyn Observer) -> Result<Mesh> {
     let (field, Bounds { min, max }) = (request.field, &request.bounds);
     let centre: Vec<f64> = min.iter().zip(max).map(|(a, b)| 0.5 * (a + b)).collect();
@@ -125,9 +135,13 @@ fn raw_mesh(request: &LevelSetRequest<'_>, observer: &dyn Observer) -> Result<Me
     let rim = request.is_open.then_some(request.sampling);
     let region = Region { lattice: &lattice, bounds: &request.bounds, rim };
     let followed = follow(field, &region, seeds, request.max_nodes, observer)?;
-    let edges = crossed_edges(&followed, &lattice);
-    let vertices = roots(field, &lattice, &followed, &edges, observer)?;
-    let cells = cut(&followed, &lattice, &edges);
+    let crossings = Crossings::of(&followed, &lattice);
+    let precision = match request.quality {
+        Quality::Regular if field.dimension() == 3 => PRECISION_OF_REGULAR,
+        Quality::Regular | Quality::Raw => PRECISION_OF_RAW,
+    };
+    let vertices = crossings.roots(field, precision, observer)?;
+    let cells = cut(&followed, &lattice, &crossings.edges);
     Ok(Mesh { dimension: field.dimension(), vertices, cells })
 }
 
@@ -135,27 +149,70 @@ fn raw_mesh(request: &LevelSetRequest<'_>, observer: &dyn Observer) -> Result<Me
 /// a surface.
 const LEAST_SIZE: f64 = 2.0;
 
-/// Leaves out parts that no point is near to, or that are too small to mean anything. Returns them too.
+/// Least number of points of its own of a part for its size, over that of the whole mesh. Bubbles beside a
+/// surface, or between sheets that nearly touch, have a quarter.
+const LEAST_OWN: f64 = 0.5;
+
+/// Leaves out parts that are too small to mean anything, or that have no points of their own near them.
+/// Returns them too.
 fn without_specks(mesh: Mesh, request: &LevelSetRequest<'_>) -> (Mesh, Vec<Part>) {
-    let sampling = request.sampling;
-    let least =
-        LEAST_SIZE * mesh.dimension as f64 * sampling.scales().spacing.powi(mesh.dimension as i32 - 1);
+    let least = LEAST_SIZE
+        * mesh.dimension as f64
+        * request.sampling.scales().spacing.powi(mesh.dimension as i32 - 1);
     let Parts { parts, of_vertex } = Parts::of(&mesh);
-    let mut is_supported = vec![false; parts.len()];
-    for (&part, support) in of_vertex.iter().zip(support(&mesh, sampling)) {
-        is_supported[part as usize] |= support == Support::Observed;
-    }
-    is_supported.iter_mut().zip(&parts).for_each(|(is_supported, part)| *is_supported &= part.area >= least);
-    let dropped: Vec<Part> = parts
-        .iter()
-        .zip(&is_supported)
-        .filter(|(_, supported)| !**supported)
-        .map(|(part, _)| *part)
-        .collect();
+    let mut is_kept = supported(&mesh, &parts, &of_vertex, request.sampling);
+    is_kept.iter_mut().zip(&parts).for_each(|(is_kept, part)| *is_kept &= part.area >= least);
+    let dropped: Vec<Part> =
+        parts.iter().zip(&is_kept).filter(|(_, is_kept)| !**is_kept).map(|(part, _)| *part).collect();
     if dropped.is_empty() {
         return (mesh, dropped);
     }
-    (mesh.filtered(|cell| is_supported[of_vertex[cell[0] as usize] as usize]), dropped)
+    (mesh.filtered(|cell| is_kept[of_vertex[cell[0] as usize] as usize]), dropped)
+}
+
+/// A vertex of a part, with the point nearest to it.
+struct Claim {
+    point: usize,
+    part: usize,
+    squared_distance: f64,
+}
+
+/// True for each part that has enough points of its own, `[n_parts]`: points to which it is the nearest part.
+fn supported(mesh: &Mesh, parts: &[Part], part_of: &[u32], sampling: &Sampling) -> Vec<bool> {
+    let nearest = nearest_points(mesh, sampling);
+    let n_own = own_points(&nearest, part_of, parts.len());
+    // Areas in units of the spacings around them.
+    let mut sizes = vec![0.0; parts.len()];
+    for (near, &part) in nearest.iter().zip(part_of) {
+        let Part { area, n_vertices, .. } = parts[part as usize];
+        let unit = sampling.spacing(near.point).powi(mesh.dimension as i32 - 1);
+        sizes[part as usize] += area / n_vertices as f64 / unit;
+    }
+    let share = n_own.iter().sum::<f64>() / sizes.iter().sum::<f64>();
+    let is_observed = observed(&nearest, sampling);
+    let mut is_near = vec![false; parts.len()];
+    part_of.iter().zip(is_observed).for_each(|(&part, is)| is_near[part as usize] |= is);
+    let has_own = |part: usize| n_own[part] >= LEAST_OWN * share * sizes[part];
+    (0..parts.len()).map(|part| is_near[part] && has_own(part)).collect()
+}
+
+/// Counts the points that are nearer to a part than to the others, `[n_parts]`, of those that are nearest to
+/// some vertex.
+fn own_points(nearest: &[Neighbour], part_of: &[u32], n_parts: usize) -> Vec<f64> {
+    let of_vertex = |(near, &part): (&Neighbour, &u32)| Claim {
+        point: near.point,
+        part: part as usize,
+        squared_distance: near.squared_distance,
+    };
+    let mut claims: Vec<Claim> = nearest.iter().zip(part_of).map(of_vertex).collect();
+    claims.par_sort_unstable_by(|a, b| {
+        let by_distance = a.squared_distance.total_cmp(&b.squared_distance);
+        a.point.cmp(&b.point).then(by_distance).then(a.part.cmp(&b.part))
+    });
+    claims.dedup_by_key(|claim| claim.point);
+    let mut n_own = vec![0.0; n_parts];
+    claims.iter().for_each(|claim| n_own[claim.part] += 1.0);
+    n_own
 }
 
 /// Whether two meshes have equally many parts, each with the same Euler characteristic and both closed or

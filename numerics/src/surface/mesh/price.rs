@@ -25,12 +25,13 @@ struct Counts {
 const PLANE: Counts = Counts { nodes: 3.6, raw_vertices: 2.3, regular_vertices: 2.3 };
 const SPACE: Counts = Counts { nodes: 5.3, raw_vertices: 6.4, regular_vertices: 1.3 };
 
-/// Evaluations of f for a raw vertex, until its root is found.
+/// Evaluations of f for a raw vertex, until its root is found, and for one that is moved afterwards anyway.
 const ROUNDS: f64 = 4.0;
+const ROUNDS_OF_REGULAR: f64 = 1.5;
 
-/// Gradients of f for a vertex of a regular mesh: six steps of smoothing on meshes that shrink, and the last
-/// steps of Newton's method.
-const SMOOTHINGS: f64 = 12.0;
+/// Gradients of f for a vertex of a regular mesh: after three rounds of smoothing on meshes that shrink, and
+/// in the last steps of Newton's method.
+const SMOOTHINGS: f64 = 7.0;
 
 /// Bytes for a raw vertex with its two triangles, edges and stars, and for a node with its cell.
 const BYTES_PER_VERTEX: f64 = 320.0;
@@ -82,11 +83,13 @@ impl MeshSize {
     /// those of one evaluation of the field.
     pub fn price(self, flops: f64) -> Price {
         let (counts, extent) = (self.counts(), self.extent());
-        let values = counts.nodes + ROUNDS * counts.raw_vertices;
-        let gradients = match self.quality {
-            Quality::Raw => counts.raw_vertices,
-            Quality::Regular => SMOOTHINGS * counts.regular_vertices,
+        let (rounds, gradients) = match self.quality {
+            Quality::Regular if self.dimension == 3 => {
+                (ROUNDS_OF_REGULAR, SMOOTHINGS * counts.regular_vertices)
+            }
+            Quality::Raw | Quality::Regular => (ROUNDS, counts.raw_vertices),
         };
+        let values = counts.nodes + rounds * counts.raw_vertices;
         let bytes_per_node = BYTES_PER_NODE + BYTES_PER_VERTEX * counts.raw_vertices / counts.nodes;
         Price {
             n_bytes: (self.max_nodes() as f64 * bytes_per_node) as usize,

@@ -50,25 +50,30 @@ pub fn mesh_of_surface(
     observer: &dyn Observer,
 ) -> Result<(LevelSet, Closedness)> {
     let (cloud, sampling) = (surface.cloud(), surface.sampling());
-    let mesh = |field: &dyn Field, closedness: Closedness| {
+    let check = |closedness: Closedness| {
         if closedness.share < OPEN && !options.is_open {
             return Err(NumericsError::OpenSurface { closedness: closedness.share });
         }
-        let mut request = request(field, cloud, sampling, options);
-        request.seeds = field.feet(cloud.coordinates(), observer)?.positions;
-        Ok((level_set(&request, observer)?, closedness))
+        Ok(closedness)
+    };
+    let mesh = |field: &dyn Field, seeds: Vec<f64>| {
+        level_set(&LevelSetRequest { seeds, ..request(field, cloud, sampling, options) }, observer)
     };
     match surface {
         Surface::Local(local) => {
             let (field, closedness) = LocalField::of(local, options.is_open, observer)?;
-            mesh(&field, closedness)
+            let closedness = check(closedness)?;
+            Ok((mesh(&field, field.feet_of_points())?, closedness))
         }
         Surface::Signature(signature) => {
             let normals = signature.normals();
             let winding = WindingNumbers::of(cloud, sampling, normals, observer)?;
             let closedness = Closedness::of(cloud, sampling, normals, winding.as_ref(), observer)?;
+            let closedness = check(closedness)?;
             let function = signature.signature();
-            mesh(&LevelOf::new(function, mean_level(function, observer)?, 1.0), closedness)
+            let field = LevelOf::new(function, mean_level(function, observer)?, 1.0);
+            let seeds = field.feet(cloud.coordinates(), observer)?.positions;
+            Ok((mesh(&field, seeds)?, closedness))
         }
     }
 }

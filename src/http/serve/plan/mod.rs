@@ -100,6 +100,7 @@ pub fn words(reason: AutoLocal) -> &'static str {
         AutoLocal::BeyondDense => "the cloud has more points than a dense factorization may have",
         AutoLocal::ManyPoints => "local regressions take time linear in the points, and this cloud is large",
         AutoLocal::Deviations => "standard deviations come from local regressions",
+        AutoLocal::FineCurve => "the level set of a finely sampled curve comes from local regressions",
     }
 }
 

@@ -22,7 +22,7 @@ use choice::{
 };
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::defaults::Purpose;
-use gramian_numerics::model::choose::{AutoLocal, prefers_local};
+use gramian_numerics::model::choose::{AutoLocal, UnfittedSurface, prefers_local};
 use gramian_numerics::patches::MAX_LOCAL_DIMENSION;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::solver::trend::Mean;
@@ -111,7 +111,7 @@ impl<'a> Planner<'a> {
         request: &GeometryRequest,
     ) -> Result<PlannedSurface, Problem> {
         let learning = self.learning(&mut options, &on.stored.cloud)?;
-        let choice = match self.choice_of_surface(&on, &options, request)? {
+        let choice = match self.choice_of_surface(&on, &options, purpose, request)? {
             Regressed::Locally(reason) => {
                 let learning = learning.map(|(_, learning)| learning);
                 SurfaceSource::Regressions { reason, learning }
@@ -150,15 +150,16 @@ impl<'a> Planner<'a> {
         &self,
         on: &FittedCloud,
         options: &FitOptions,
+        purpose: Purpose,
         request: &GeometryRequest,
     ) -> Result<Regressed, Problem> {
-        let (n, d) = (on.stored.cloud.n_points(), on.stored.cloud.dimension());
+        let (n_points, dimension) = (on.stored.cloud.n_points(), on.stored.cloud.dimension());
         let given = options.given_process(on.pointers);
         if options.solver == SolverChoice::Local || request.model == SurfaceModel::Local {
             let pointer = if options.solver == SolverChoice::Local { "/solver" } else { "/surface" };
-            if d > MAX_LOCAL_DIMENSION {
+            if dimension > MAX_LOCAL_DIMENSION {
                 let detail = format!(
-                    "local regressions serve surfaces in dimensions 2 to {MAX_LOCAL_DIMENSION}, the cloud has {d}"
+                    "local regressions serve surfaces in dimensions 2 to {MAX_LOCAL_DIMENSION}, the cloud has {dimension}"
                 );
                 return Err(Problem::of_field(Slug::UnsupportedBySolver, pointer, detail));
             }
@@ -172,8 +173,9 @@ impl<'a> Planner<'a> {
         if options.solver != SolverChoice::Auto || request.model != SurfaceModel::Auto || given.is_some() {
             return Ok(Regressed::No);
         }
-        let max_dense_points = self.app.config.max_dense_points;
-        Ok(match prefers_local(n, d, max_dense_points, request.has_deviations) {
+        let has_deviations = request.has_deviations;
+        let surface = UnfittedSurface { n_points, dimension, purpose, has_deviations };
+        Ok(match prefers_local(&surface, self.app.config.max_dense_points) {
             None => Regressed::No,
             reason => Regressed::Locally(reason),
         })

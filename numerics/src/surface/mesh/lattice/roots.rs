@@ -9,18 +9,63 @@ use crate::machine::small::Small;
 use crate::observer::Observer;
 use crate::surface::mesh::field::Field;
 
-/// Part of the difference of f along an edge up to which a place counts as found. Newton's steps with the
-/// gradient, which follow for all vertices, are then exact.
-const PRECISION: f64 = 1e-4;
-
 /// Rounds of the Illinois method (Dowell and Jarratt 1971), after which an interval is halved instead.
 const ILLINOIS_ROUNDS: usize = 8;
 
-/// Rounds in all. Where f jumps, halving leaves the place of the jump to a part [`PRECISION`] of the edge.
+/// Rounds in all. Where f jumps, halving leaves the place of the jump to a part 1e-4 of the edge.
 const MAX_ROUNDS: usize = ILLINOIS_ROUNDS + 14;
 
-/// Finds the edges of the simplices whose ends differ in sign, sorted.
-pub fn crossed_edges(followed: &Followed, lattice: &Lattice) -> Vec<Edge> {
+/// The edges of a lattice that the surface crosses.
+pub struct Crossings<'a> {
+    lattice: &'a Lattice,
+    followed: &'a Followed,
+    /// Edges of simplices whose ends differ in sign, sorted.
+    pub edges: Vec<Edge>,
+}
+
+impl<'a> Crossings<'a> {
+    pub fn of(followed: &'a Followed, lattice: &'a Lattice) -> Self {
+        Self { lattice, followed, edges: crossed_edges(followed, lattice) }
+    }
+
+    /// Finds the place on each edge where f is 0, `[edges, d]`. Where f jumps over 0, it is the place of the
+    /// jump.
+    ///
+    /// `precision` is the part of the difference of f along an edge up to which a place counts as found.
+    ///
+    /// # Errors
+    /// Those of the field.
+    pub fn roots(&self, field: &dyn Field, precision: f64, observer: &dyn Observer) -> Result<Vec<f64>> {
+        let Self { lattice, followed, edges } = self;
+        let bracket = |(edge, ends): (usize, &Edge)| {
+            let [f_low, f_high] = ends.ends().map(|node| followed.samples.value(node));
+            let tolerance = field.tolerance().max(precision * (f_low - f_high).abs());
+            Bracket { edge, low: 0.0, high: 1.0, f_low, f_high, tolerance }
+        };
+        let mut open: Vec<Bracket> = edges.iter().enumerate().map(bracket).collect();
+        let mut roots = vec![0.0; edges.len()];
+        for round in 0..MAX_ROUNDS {
+            if open.is_empty() {
+                break;
+            }
+            observer.checkpoint()?;
+            let guesses: Vec<f64> = open.iter().map(|bracket| bracket.guess(round)).collect();
+            let on_edges = open.iter().zip(&guesses);
+            let places: Vec<f64> =
+                on_edges.flat_map(|(bracket, &t)| along(lattice, edges[bracket.edge], t)).collect();
+            let values = field.values(&places, observer)?;
+            for (bracket, (&t, &f)) in open.iter_mut().zip(guesses.iter().zip(&values)) {
+                roots[bracket.edge] = t;
+                bracket.narrow(t, f);
+            }
+            let mut magnitudes = values.iter().map(|f| f.abs());
+            open.retain(|bracket| magnitudes.next().is_some_and(|f| f > bracket.tolerance));
+        }
+        Ok(edges.iter().zip(roots).flat_map(|(&edge, t)| along(lattice, edge, t)).collect())
+    }
+}
+
+fn crossed_edges(followed: &Followed, lattice: &Lattice) -> Vec<Edge> {
     let n_corners = 1 << lattice.dimension();
     let pairs = nested_corners(n_corners);
     let of_cell = |cell: &_| {
@@ -77,46 +122,6 @@ impl Bracket {
             self.f_low *= 0.5;
         }
     }
-}
-
-/// Finds the place on each edge where f is 0, within a small part of the edge, `[edges, d]`.
-///
-/// Where f jumps over 0, it is the place of the jump.
-///
-/// # Errors
-/// Those of the field.
-pub fn roots(
-    field: &dyn Field,
-    lattice: &Lattice,
-    followed: &Followed,
-    edges: &[Edge],
-    observer: &dyn Observer,
-) -> Result<Vec<f64>> {
-    let bracket = |(edge, ends): (usize, &Edge)| {
-        let [f_low, f_high] = ends.ends().map(|node| followed.samples.value(node));
-        let tolerance = field.tolerance().max(PRECISION * (f_low - f_high).abs());
-        Bracket { edge, low: 0.0, high: 1.0, f_low, f_high, tolerance }
-    };
-    let mut open: Vec<Bracket> = edges.iter().enumerate().map(bracket).collect();
-    let mut roots = vec![0.0; edges.len()];
-    for round in 0..MAX_ROUNDS {
-        if open.is_empty() {
-            break;
-        }
-        observer.checkpoint()?;
-        let guesses: Vec<f64> = open.iter().map(|bracket| bracket.guess(round)).collect();
-        let on_edges = open.iter().zip(&guesses);
-        let places: Vec<f64> =
-            on_edges.flat_map(|(bracket, &t)| along(lattice, edges[bracket.edge], t)).collect();
-        let values = field.values(&places, observer)?;
-        for (bracket, (&t, &f)) in open.iter_mut().zip(guesses.iter().zip(&values)) {
-            roots[bracket.edge] = t;
-            bracket.narrow(t, f);
-        }
-        let mut magnitudes = values.iter().map(|f| f.abs());
-        open.retain(|bracket| magnitudes.next().is_some_and(|f| f > bracket.tolerance));
-    }
-    Ok(edges.iter().zip(roots).flat_map(|(&edge, t)| along(lattice, edge, t)).collect())
 }
 
 /// The place a part t of the way along an edge.

@@ -1,5 +1,7 @@
 //! Collapse of short edges.
 
+use rayon::prelude::*;
+
 use super::EDGES_AT_ONCE;
 use super::star::Triangulation;
 use crate::error::Result;
@@ -25,11 +27,11 @@ const LEAST_STAR: usize = 4;
 pub fn collapse(mesh: &mut Triangulation, length: f64, observer: &dyn Observer) -> Result<()> {
     let mut edges: Vec<(f64, [u32; 2])> = mesh
         .edges()
-        .into_iter()
+        .into_par_iter()
         .map(|[a, b]| (mesh.squared_length(a, b), [a, b]))
         .filter(|(squared, _)| *squared < (SHORT * length).powi(2))
         .collect();
-    edges.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    edges.par_sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut has_moved = vec![false; mesh.positions.len()];
     for (at, (_, [a, b])) in edges.into_iter().enumerate() {
         if at % EDGES_AT_ONCE == 0 {

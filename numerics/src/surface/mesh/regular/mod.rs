@@ -34,9 +34,10 @@ pub fn regular(mesh: &Mesh, field: &dyn Field, length: f64, observer: &dyn Obser
         collapse::collapse(&mut triangles, length, observer)?;
         flip::flip(&mut triangles, observer)?;
         for _ in 0..SMOOTHINGS {
-            smooth::smooth(&mut triangles, field, observer)?;
+            smooth::smooth(&mut triangles);
             flip::flip(&mut triangles, observer)?;
         }
+        smooth::project(&mut triangles, field, observer)?;
     }
     Ok(triangles.into_mesh())
 }

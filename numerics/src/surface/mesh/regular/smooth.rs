@@ -11,20 +11,31 @@ use crate::surface::mesh::field::Field;
 /// Least cosine between the normals of a triangle before and after its vertex has moved.
 const TURN: f64 = 0.5;
 
-/// Moves each vertex to the mean of its neighbours along the surface, and back onto the surface.
+/// Moves each vertex to the mean of its neighbours in its tangent plane.
+pub fn smooth(mesh: &mut Triangulation) {
+    let moving = moving(mesh);
+    let wanted: Vec<[f64; 3]> = moving.par_iter().map(|&vertex| tangential_mean(mesh, vertex)).collect();
+    moving.iter().zip(wanted).for_each(|(&vertex, to)| move_to(mesh, vertex, to));
+}
+
+/// Moves each vertex back onto the surface, by one step of Newton's method.
 ///
 /// # Errors
 /// Those of the field.
-pub fn smooth(mesh: &mut Triangulation, field: &dyn Field, observer: &dyn Observer) -> Result<()> {
-    let moving: Vec<u32> = (0..mesh.stars.len() as u32)
-        .filter(|&v| !mesh.is_fixed[v as usize] && !mesh.star(v).is_empty())
-        .collect();
-    let wanted: Vec<[f64; 3]> = moving.par_iter().map(|&vertex| tangential_mean(mesh, vertex)).collect();
-    let feet = field.feet(wanted.as_flattened(), observer)?.positions;
+pub fn project(mesh: &mut Triangulation, field: &dyn Field, observer: &dyn Observer) -> Result<()> {
+    let moving = moving(mesh);
+    let places: Vec<[f64; 3]> = moving.iter().map(|&vertex| *mesh.position(vertex)).collect();
+    let feet = field.feet(places.as_flattened(), observer)?.positions;
     for (&vertex, foot) in moving.iter().zip(feet.chunks_exact(3)) {
         move_to(mesh, vertex, [foot[0], foot[1], foot[2]]);
     }
     Ok(())
+}
+
+/// The vertices that are not on the boundary.
+fn moving(mesh: &Triangulation) -> Vec<u32> {
+    let n = mesh.stars.len() as u32;
+    (0..n).filter(|&v| !mesh.is_fixed[v as usize] && !mesh.star(v).is_empty()).collect()
 }
 
 /// The mean of the neighbours of a vertex, weighted by the area of their triangles, in its tangent plane.

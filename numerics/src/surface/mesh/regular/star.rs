@@ -1,5 +1,6 @@
 //! Triangles with the triangles around each vertex.
 
+use rayon::prelude::*;
 use smallvec::SmallVec;
 
 use crate::machine::vector::{dot, norm};
@@ -75,7 +76,7 @@ impl Triangulation {
     pub fn edges(&self) -> Vec<[u32; 2]> {
         let n = self.stars.len() as u32;
         let of_vertex = |a: u32| self.neighbours(a).into_iter().filter(move |&b| b > a).map(move |b| [a, b]);
-        (0..n).flat_map(of_vertex).collect()
+        (0..n).into_par_iter().flat_map_iter(of_vertex).collect()
     }
 
     pub fn squared_length(&self, a: u32, b: u32) -> f64 {

@@ -45,9 +45,26 @@ impl WindingNumbers {
         Ok(Some(Self { dipoles: Dipoles::of(&scaled, &moments, &all), radius }))
     }
 
+    /// Makes the points softer: their softening length is this part of the width of their area.
+    #[must_use]
+    pub(crate) fn softened(mut self, softening: f64) -> Self {
+        self.dipoles.soften(softening);
+        self
+    }
+
     /// Returns w(x).
     pub(crate) fn at(&self, x: &[f64]) -> f64 {
-        let scaled: Small = x.iter().map(|c| c / self.radius).collect();
-        self.dipoles.winding(&scaled)
+        self.dipoles.winding(&self.scaled(x))
+    }
+
+    /// Returns w(x) and its gradient, `[d]`, 1/L.
+    pub(crate) fn jet(&self, x: &[f64]) -> (f64, Small) {
+        let (winding, mut gradient) = self.dipoles.winding_jet(&self.scaled(x));
+        gradient.iter_mut().for_each(|g| *g /= self.radius);
+        (winding, gradient)
+    }
+
+    fn scaled(&self, x: &[f64]) -> Small {
+        x.iter().map(|c| c / self.radius).collect()
     }
 }

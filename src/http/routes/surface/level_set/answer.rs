@@ -16,12 +16,13 @@ use gramian_numerics::model::{JetRequest, Report};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::median;
 use gramian_numerics::sums::jets::JetOrder;
+use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::Orientation;
 use gramian_numerics::surface::mesh::fields::interpolant::LevelOf;
 use gramian_numerics::surface::mesh::surface::{curvatures_of_level, mesh_of_level, mesh_of_surface};
 use gramian_numerics::surface::mesh::{Closedness, DOUBTFUL, LevelSet, Part, Support};
 
-/// Share of a level set that may be left out as small parts without a warning.
+/// Share of a level set that is left out as small parts, from which the surface itself may be lacking.
 const MUCH_DROPPED: f64 = 0.05;
 
 /// What was asked about the vertices of a mesh.
@@ -61,7 +62,12 @@ pub fn of_surface(
     let (fitted, surface) = (fits.surface(), fits.made_surface()?);
     let made = mesh_of_surface(surface, &work.options, observer);
     let (found, closedness) = made.map_err(|error| fitted.refused(error))?;
-    let empty = "no surface was found here; make step shorter, or bounds wider";
+    let empty = match surface.as_ref() {
+        Surface::Local(_) => "no surface was found here; make step shorter, or bounds wider",
+        Surface::Signature(_) => {
+            "no surface was found here; ask for the surface local, or for a longer length scale"
+        }
+    };
     let meshed = Meshed::new(found, Some(closedness.share), Problem::invalid_request("/step", empty))?;
     let (k, d) = (meshed.vertices.n_points(), meshed.vertices.dimension());
     let mut at = AtVertices::default();
@@ -156,16 +162,34 @@ fn warning_of_closedness(closedness: Closedness, is_open: bool) -> Option<Warnin
     Some(Warning { code: WarningCode::OpenCloud, detail })
 }
 
-/// Warns where much of a level set was left out, as where a short kernel makes a fine curve a row of islands.
+/// Warns of parts that were left out. Where a short kernel makes a fine curve a row of islands, they are most
+/// of it.
 fn warning_of_dropped(parts: &[Part], dropped: &[Part]) -> Option<Warning> {
+    if dropped.is_empty() {
+        return None;
+    }
     let area = |parts: &[Part]| parts.iter().map(|part| part.area).sum::<f64>();
     let share = area(dropped) / (area(parts) + area(dropped));
-    (share > MUCH_DROPPED).then(|| {
+    let advice = if share > MUCH_DROPPED {
+        ", so the mesh may lack most of the surface; ask for the surface local, or for a longer length scale"
+    } else {
+        ""
+    };
+    let (n_dropped, percent) = (dropped.len(), 100.0 * share);
+    let detail = format!("{n_dropped} small parts were left out, {percent:.2} % of the level set{advice}");
+    Some(Warning { code: WarningCode::PartsDropped, detail })
+}
+
+/// Warns of vertices that have no points near them.
+fn warning_of_support(support: &[Support]) -> Option<Warning> {
+    let share =
+        |of: Support| 100.0 * support.iter().filter(|s| **s == of).count() as f64 / support.len() as f64;
+    let (bridged, extrapolated) = (share(Support::Bridged), share(Support::Extrapolated));
+    (bridged + extrapolated > 0.0).then(|| {
         let detail = format!(
-            "{:.0} % of the level set are small parts that were left out, so the mesh may lack most of the surface; ask for the surface local, or for a longer length scale",
-            100.0 * share
+            "{bridged:.2} % of the vertices bridge holes of the cloud, and {extrapolated:.2} % lie beyond its points; support says which"
         );
-        Warning { code: WarningCode::OpenCloud, detail }
+        Warning { code: WarningCode::Bridged, detail }
     })
 }
 
@@ -182,6 +206,7 @@ fn answer(
         diagnostics.warnings.push(Warning { code: WarningCode::RawMesh, detail });
     }
     diagnostics.warnings.extend(warning_of_dropped(&parts, &dropped));
+    diagnostics.warnings.extend(warning_of_support(&support));
     let mut cells = mesh.cells;
     if is_turned(work) {
         normals.iter_mut().for_each(|c| *c = -*c);

@@ -148,7 +148,8 @@ answer! {
         mean_curvature_deviations: Option<Array> as Option<Vec<Option<f64>>>,
         /// The connected parts of the mesh, largest first.
         parts: Vec<MeshPart>,
-        /// Parts that were left out: no point is near them, or they are smaller than six points' worth.
+        /// Parts that were left out: no point is near them, they have too few points of their own, or they
+        /// are too small to mean anything.
         dropped_parts: Vec<MeshPart>,
         /// The share of the points with the inside on one side and the outside on the other, by winding
         /// numbers.

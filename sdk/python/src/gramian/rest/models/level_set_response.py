@@ -34,8 +34,9 @@ class LevelSetResponse:
 
             Null where the function is flat.
         parts (list[MeshPart]): The connected parts of the mesh, largest first.
-        dropped_parts (list[MeshPart]): Parts that were left out: no point is near them, or they are smaller than six
-            points' worth.
+        dropped_parts (list[MeshPart]): Parts that were left out: no point is near them, they have too few points of
+            their own, or they
+            are too small to mean anything.
         diagnostics (Diagnostics): Diagnostics of an answer: the numbers used, the method, and its accuracy.
         principal_curvatures (list[list[float] | None] | Unset): The d − 1 principal curvatures at each vertex,
             ascending, 1/length.

@@ -2,6 +2,7 @@ from enum import StrEnum
 
 
 class WarningCode(StrEnum):
+    BRIDGED = "bridged"
     DISAGREES_WITH_NEIGHBOURS = "disagrees_with_neighbours"
     DUPLICATES_MERGED = "duplicates_merged"
     FAR_FROM_CLOUD = "far_from_cloud"
@@ -12,6 +13,7 @@ class WarningCode(StrEnum):
     OFFSET_MODEL_USED = "offset_model_used"
     OPEN_CLOUD = "open_cloud"
     ORIENTATION_REPAIRED = "orientation_repaired"
+    PARTS_DROPPED = "parts_dropped"
     RAW_MESH = "raw_mesh"
     REFINED = "refined"
     VARIANCE_CLAMPED = "variance_clamped"
