@@ -110,6 +110,7 @@ impl<'a> LocalField<'a> {
         };
         let closedness = closedness_by(&winding)?;
         let side = if closedness.is_turned { -1.0 } else { 1.0 };
+        // Softened numbers jump by less, but say less of which points have two sides.
         let winding = winding.map(|winding| winding.softened(SOFTENING));
         let jump = closedness_by(&winding)?.jump;
         Ok((Self { cloud, sampling, at_points, winding, jump, side, is_open }, closedness))

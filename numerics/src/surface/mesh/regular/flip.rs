@@ -25,9 +25,13 @@ const MAX_SWEEPS: usize = 20;
 pub fn flip(mesh: &mut Triangulation, observer: &dyn Observer) -> Result<()> {
     let mut edges = mesh.edges();
     for _ in 0..MAX_SWEEPS {
-        edges = edges.into_par_iter().filter(|&edge| Flip::of(mesh, edge).is_some()).collect();
-        let mut around = Vec::new();
+        let mut gains = Vec::new();
         for edges in edges.chunks(EDGES_AT_ONCE) {
+            observer.checkpoint()?;
+            gains.par_extend(edges.par_iter().copied().filter(|&edge| Flip::of(mesh, edge).is_some()));
+        }
+        let mut around = Vec::new();
+        for edges in gains.chunks(EDGES_AT_ONCE) {
             observer.checkpoint()?;
             for &edge in edges {
                 // An earlier flip may have changed what is best here.

@@ -20,7 +20,7 @@ const ROUNDS: usize = 3;
 /// Smoothing steps of a round.
 const SMOOTHINGS: usize = 2;
 
-/// Edges looked at between two looks at whether the work is cancelled.
+/// Edges or vertices looked at between two looks at whether the work is cancelled.
 const EDGES_AT_ONCE: usize = 1 << 14;
 
 /// Makes the triangles of a mesh (d = 3) regular, with edges about as long as `length`. Vertices stay on the
@@ -34,7 +34,7 @@ pub fn regular(mesh: &Mesh, field: &dyn Field, length: f64, observer: &dyn Obser
         collapse::collapse(&mut triangles, length, observer)?;
         flip::flip(&mut triangles, observer)?;
         for _ in 0..SMOOTHINGS {
-            smooth::smooth(&mut triangles);
+            smooth::smooth(&mut triangles, observer)?;
             flip::flip(&mut triangles, observer)?;
         }
         smooth::project(&mut triangles, field, observer)?;

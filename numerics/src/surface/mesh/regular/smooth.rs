@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::EDGES_AT_ONCE;
 use super::star::Triangulation;
 use crate::error::Result;
 use crate::machine::vector::{dot, norm};
@@ -12,10 +13,18 @@ use crate::surface::mesh::field::Field;
 const TURN: f64 = 0.5;
 
 /// Moves each vertex to the mean of its neighbours in its tangent plane.
-pub fn smooth(mesh: &mut Triangulation) {
+///
+/// # Errors
+/// `NumericsError::Cancelled`.
+pub fn smooth(mesh: &mut Triangulation, observer: &dyn Observer) -> Result<()> {
     let moving = moving(mesh);
-    let wanted: Vec<[f64; 3]> = moving.par_iter().map(|&vertex| tangential_mean(mesh, vertex)).collect();
+    let mut wanted = Vec::with_capacity(moving.len());
+    for vertices in moving.chunks(EDGES_AT_ONCE) {
+        observer.checkpoint()?;
+        wanted.par_extend(vertices.par_iter().map(|&vertex| tangential_mean(mesh, vertex)));
+    }
     moving.iter().zip(wanted).for_each(|(&vertex, to)| move_to(mesh, vertex, to));
+    Ok(())
 }
 
 /// Moves each vertex back onto the surface, by one step of Newton's method.

@@ -144,11 +144,7 @@ fn add_slope(dipole: Dipole<'_>, x: &[f64], gradient: &mut [f64]) {
     }
     let d = x.len();
     let along: f64 = moment.iter().zip(y).zip(x).map(|((m, y), x)| m * (y - x)).sum();
-    let power = match d {
-        2 => squared,
-        3 => squared * squared.sqrt(),
-        d => squared.sqrt().powi(d as i32),
-    };
+    let power = root_to_power(squared, d);
     let radial = d as f64 * along / (squared * power);
     for axis in 0..d {
         gradient[axis] += radial * (y[axis] - x[axis]) - moment[axis] / power;
@@ -162,10 +158,15 @@ fn flux(moment: &[f64], y: &[f64], x: &[f64], softening: f64) -> f64 {
         return 0.0;
     }
     let along: f64 = moment.iter().zip(y).zip(x).map(|((m, y), x)| m * (y - x)).sum();
-    match x.len() {
-        2 => along / squared,
-        3 => along / (squared * squared.sqrt()),
-        d => along / squared.sqrt().powi(d as i32),
+    along / root_to_power(squared, x.len())
+}
+
+/// The power d of a square root.
+fn root_to_power(squared: f64, d: usize) -> f64 {
+    match d {
+        2 => squared,
+        3 => squared * squared.sqrt(),
+        d => squared.sqrt().powi(d as i32),
     }
 }
 
