@@ -136,9 +136,12 @@ def interpolation(points: Floats, values: Floats, queries: Floats, n_neighbours:
 
 
 def poisson(points: Floats, normals: Floats, size: int) -> Arrays:
-    """Screened Poisson reconstruction to an octree of depth `size`, from the true normals."""
+    """Screened Poisson reconstruction to an octree of depth `size`, from the true normals.
+
+    Points without a normal, whose faces contradict each other, are left out, since it refuses them.
+    """
     scene = meshlab(points, normals)
-    scene.generate_surface_reconstruction_screened_poisson(depth=size)
+    scene.generate_surface_reconstruction_screened_poisson(depth=size, preclean=True)
     return current_mesh(scene)
 
 

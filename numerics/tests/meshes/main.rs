@@ -93,21 +93,37 @@ fn linked_tori_are_two_parts_with_a_hole_each() {
     assert_is_manifold(&found.mesh);
 }
 
-/// Share of the vertices of a noisy cloud's mesh whose distance `off` from the truth is within 1.96 of their
-/// deviations.
-fn share_within(cloud: &Cloud, noise: f64, off: impl Fn(&[f64]) -> f64) -> f64 {
-    let surface = local(noisy(cloud, noise, &mut Random(13)));
-    let (found, _) = meshed(&surface, &OPTIONS);
-    assert_eq!(found.parts.iter().map(|part| part.euler_characteristic).collect::<Vec<_>>(), [2]);
-    let vertices = Cloud::new(found.mesh.vertices.clone(), 3).unwrap();
-    let geometry = Geometry::of(&surface, &vertices, &WITH_DEVIATIONS, &Unobserved).unwrap();
-    let known = geometry.deviations().unwrap();
-    let rows = vertices.points().zip(&known.height).zip(&known.is_known);
-    let within: Vec<bool> = rows
-        .filter(|(_, is_known)| **is_known)
-        .map(|((x, deviation), _)| off(x) <= 1.96 * deviation)
-        .collect();
-    within.iter().filter(|is_within| **is_within).count() as f64 / within.len() as f64
+/// Points of a closed body, with its Euler characteristic and the distance of any place from its surface.
+struct Body<'a> {
+    points: &'a Cloud,
+    characteristic: i64,
+    /// Noise, in spacings, up to which the mesh has this characteristic. Noise of a spacing is a fifth of the
+    /// tube of the torus.
+    known_up_to: f64,
+    off: &'a dyn Fn(&[f64]) -> f64,
+}
+
+impl Body<'_> {
+    /// Meshes the points with noise of so many spacings. Returns the share of the vertices whose distance
+    /// from the truth is within 1.96 of their deviations.
+    fn share_within(&self, spacings: f64) -> f64 {
+        let surface = local(noisy(self.points, spacings * spacing_of(self.points), &mut Random(13)));
+        let (found, _) = meshed(&surface, &OPTIONS);
+        if spacings <= self.known_up_to {
+            let characteristics: Vec<i64> =
+                found.parts.iter().map(|part| part.euler_characteristic).collect();
+            assert_eq!(characteristics, [self.characteristic], "noise of {spacings} spacings");
+        }
+        let vertices = Cloud::new(found.mesh.vertices.clone(), 3).unwrap();
+        let geometry = Geometry::of(&surface, &vertices, &WITH_DEVIATIONS, &Unobserved).unwrap();
+        let known = geometry.deviations().unwrap();
+        let rows = vertices.points().zip(&known.height).zip(&known.is_known);
+        let within: Vec<bool> = rows
+            .filter(|(_, is_known)| **is_known)
+            .map(|((x, deviation), _)| (self.off)(x) <= 1.96 * deviation)
+            .collect();
+        within.iter().filter(|is_within| **is_within).count() as f64 / within.len() as f64
+    }
 }
 
 #[test]
@@ -120,12 +136,32 @@ fn vertices_are_as_near_to_the_truth_as_their_deviations_say() {
     };
     let sphere = fibonacci_sphere(2000);
     let ellipsoid = Cloud::new(sphere.points().flat_map(|x| [2.0 * x[0], x[1], x[2]]).collect(), 3).unwrap();
-    for spacings in [0.5, 1.0] {
-        let of_sphere = share_within(&sphere, spacings * spacing_of(&sphere), off_sphere);
-        let of_ellipsoid = share_within(&ellipsoid, spacings * spacing_of(&ellipsoid), off_ellipsoid);
-        for share in [of_sphere, of_ellipsoid] {
-            assert!((0.9..=0.995).contains(&share), "noise of {spacings} spacings: {share}");
-        }
+    let torus = random_torus(3000, &mut Random(12));
+    let bodies = [
+        Body { points: &sphere, characteristic: 2, known_up_to: 1.0, off: &off_sphere },
+        Body { points: &ellipsoid, characteristic: 2, known_up_to: 1.0, off: &off_ellipsoid },
+        Body { points: &torus, characteristic: 0, known_up_to: 0.5, off: &off_torus },
+    ];
+    for (body, spacings) in bodies.iter().flat_map(|body| [(body, 0.5), (body, 1.0)]) {
+        let share = body.share_within(spacings);
+        assert!((0.9..=0.995).contains(&share), "noise of {spacings} spacings: {share}");
+    }
+}
+
+#[test]
+fn normals_of_noisy_points_are_outward() {
+    let torus = random_torus(3000, &mut Random(12));
+    for spacings in [0.25, 0.5, 0.75, 1.0] {
+        let cloud = noisy(&torus, spacings * spacing_of(&torus), &mut Random(13));
+        let geometry = Geometry::of(&local(cloud.clone()), &cloud, &WITH_DEVIATIONS, &Unobserved).unwrap();
+        let is_inward = |(x, normal): (&[f64], &[f64])| {
+            let ring = 2.0 / x[0].hypot(x[1]);
+            let outward = [x[0] * (1.0 - ring), x[1] * (1.0 - ring), x[2]];
+            outward.iter().zip(normal).map(|(a, b)| a * b).sum::<f64>() < 0.0
+        };
+        let n_inward =
+            cloud.points().zip(geometry.normals().chunks_exact(3)).filter(|row| is_inward(*row)).count();
+        assert!(n_inward <= 30, "noise of {spacings} spacings: {n_inward} of 3000");
     }
 }
 

@@ -1,6 +1,7 @@
 //! The surface made of local regressions, with one side chosen for all of it.
 
 pub mod coarse;
+pub(crate) mod smoothed;
 pub mod sure;
 
 use std::sync::Arc;
@@ -24,6 +25,7 @@ use crate::points::neighbourhoods::Neighbourhoods;
 use crate::points::neighbours::Neighbour;
 use crate::points::sampling::Sampling;
 use coarse::outward_directions;
+use smoothed::{Placed, Smoothed};
 use sure::least_ratio;
 
 /// Cosine between a normal and the gradient of the coarse function above which the sign of the normal is
@@ -159,6 +161,12 @@ impl LocalSurface {
 
     pub fn patches(&self) -> &Patches {
         &self.patches
+    }
+
+    /// Returns the feet of the points, unless the points tell their sides as well.
+    pub(crate) fn smoothed(&self, observer: &dyn Observer) -> Result<Option<Smoothed>, NumericsError> {
+        let points = Placed { cloud: &self.cloud, sampling: &self.sampling };
+        Smoothed::of_noisy(points, &self.at_points, self.patches.noise(), observer)
     }
 
     /// Returns what the regressions learned, or were given.
@@ -342,6 +350,8 @@ fn orient(
     for (point, normal) in normals.chunks_exact_mut(d).enumerate() {
         has_sign[point] = turn_along(normal, &outward[point * d..][..d]);
     }
+    let smoothed = Smoothed::of_noisy(Placed { cloud, sampling }, geometry, patches.noise(), observer)?;
+    let Placed { cloud, sampling } = smoothed.as_ref().map_or(Placed { cloud, sampling }, Smoothed::placed);
     let count = super::orientation::n_around(cloud);
     let around = Neighbourhoods::of(sampling.neighbours(), cloud, count, observer)?;
     let directions = Directions { normals, has_sign, is_at_rim: geometry.is_at_rim.clone() };

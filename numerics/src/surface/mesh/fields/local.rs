@@ -24,6 +24,7 @@ use crate::points::cloud::{Cloud, squared_distance};
 use crate::points::neighbours::Neighbour;
 use crate::points::sampling::Sampling;
 use crate::surface::local::LocalSurface;
+use crate::surface::local::smoothed::{Placed, Smoothed};
 use crate::surface::mesh::closedness::Closedness;
 use crate::surface::mesh::field::{Feet, Field};
 use crate::surface::orientation::WindingNumbers;
@@ -104,9 +105,12 @@ impl<'a> LocalField<'a> {
     ) -> Result<(Self, Closedness)> {
         let (cloud, sampling) = (surface.cloud(), surface.sampling());
         let at_points = surface.at_points();
-        let winding = WindingNumbers::of(cloud, sampling, &at_points.normals, observer)?;
+        let smoothed = surface.smoothed(observer)?;
+        let on = smoothed.as_ref().map_or(Placed { cloud, sampling }, Smoothed::placed);
+        let normals = &at_points.normals;
+        let winding = WindingNumbers::of(on.cloud, on.sampling, normals, observer)?;
         let closedness_by = |winding: &Option<WindingNumbers>| {
-            Closedness::of(cloud, sampling, &at_points.normals, winding.as_ref(), observer)
+            Closedness::of(on.cloud, on.sampling, normals, winding.as_ref(), observer)
         };
         let closedness = closedness_by(&winding)?;
         let side = if closedness.is_turned { -1.0 } else { 1.0 };
