@@ -7,6 +7,7 @@ use crate::function::price::{self as functions, deviations_price, judging_price,
 use crate::machine::price::{Price, Sizes};
 use crate::solver::price::FactorPrice;
 use crate::sums::price::pair_flops;
+use crate::surface::mesh::fields::quadrics::BYTES_PER_POINT;
 use crate::surface::mesh::price::{LOCAL_EVALUATION, MeshSize};
 use crate::surface::operators::JUDGED_FUNCTIONALS;
 use crate::surface::operators::price::applied_price;
@@ -128,10 +129,14 @@ pub fn geometry_price(surface: SolverKind, asked: AskedOfSurface, sizes: Sizes) 
 
 /// The price of meshing the surface of a model, or a level of its values.
 pub fn level_set_price(solver: SolverKind, size: MeshSize) -> Price {
-    size.price(match solver {
-        SolverKind::Dense => size.n_points as f64 * pair_flops(size.dimension, 0),
-        SolverKind::Local => LOCAL_EVALUATION,
-    })
+    match solver {
+        SolverKind::Dense => size.price(size.n_points as f64 * pair_flops(size.dimension, 0)),
+        SolverKind::Local => {
+            let mesh = size.price(LOCAL_EVALUATION);
+            let n_bytes = mesh.n_bytes.saturating_add(size.n_points.saturating_mul(BYTES_PER_POINT));
+            Price { n_bytes, ..mesh }
+        }
+    }
 }
 
 /// The price of an operator applied to values by one solver on a surface by another.

@@ -120,6 +120,12 @@ impl Neighbours {
         self.name_first_points(found);
     }
 
+    /// Writes the `count` nearest positions, nearest first, as indices for [`Neighbours::points_at`]. Indices
+    /// of positions near each other are mostly near each other too.
+    pub(crate) fn nearest_in_tree_into(&self, x: &[f64], count: usize, found: &mut Vec<Neighbour>) {
+        self.search(x, count, found);
+    }
+
     /// Returns the distances from a position to its `count` nearest others, or `None` if there are none.
     /// `found` is scratch space.
     pub fn distances(&self, position: usize, count: usize, found: &mut Vec<Neighbour>) -> Option<Distances> {

@@ -17,16 +17,14 @@ use rayon::prelude::*;
 
 use crate::error::Result;
 use crate::machine::small::{Small, zeros};
-use crate::machine::vector::{dot, norm};
+use crate::machine::vector::norm;
 use crate::observer::Observer;
-use crate::patches::PatchGeometry;
-use crate::points::cloud::{Cloud, squared_distance};
 use crate::points::neighbours::Neighbour;
-use crate::points::sampling::Sampling;
 use crate::surface::local::LocalSurface;
 use crate::surface::local::smoothed::{Placed, Smoothed};
 use crate::surface::mesh::closedness::Closedness;
 use crate::surface::mesh::field::{Feet, Field};
+use crate::surface::mesh::fields::quadrics::{Blend, Quadrics, Vector, padded};
 use crate::surface::orientation::WindingNumbers;
 
 /// Number of points whose heights are blended. Their weights fall to 0 at the last one.
@@ -66,10 +64,8 @@ impl Ramp {
 
 /// The function of a local surface.
 pub struct LocalField<'a> {
-    cloud: &'a Cloud,
-    sampling: &'a Sampling,
-    /// Geometry at the points, normals outward.
-    at_points: &'a PatchGeometry,
+    surface: &'a LocalSurface,
+    quadrics: Quadrics,
     winding: Option<WindingNumbers>,
     /// Difference of the winding numbers across the surface, which the areas of the points make 1 or not.
     jump: f64,
@@ -77,20 +73,6 @@ pub struct LocalField<'a> {
     side: f64,
     /// True if the heights alone are the field, since winding numbers of open sheets say nothing.
     is_open: bool,
-}
-
-/// Blend of the quadrics around a place.
-struct Blend {
-    /// Height over the surface, outward, L.
-    height: f64,
-    /// Gradient of the height without that of the weights, about a unit vector, `[d]`.
-    gradient: Small,
-    /// ρ: how far the blend is to be trusted.
-    trust: f64,
-    /// Distance to the nearest point, L.
-    distance: f64,
-    /// Spacing at the nearest point, L.
-    spacing: f64,
 }
 
 impl<'a> LocalField<'a> {
@@ -104,10 +86,9 @@ impl<'a> LocalField<'a> {
         observer: &dyn Observer,
     ) -> Result<(Self, Closedness)> {
         let (cloud, sampling) = (surface.cloud(), surface.sampling());
-        let at_points = surface.at_points();
         let smoothed = surface.smoothed(observer)?;
         let on = smoothed.as_ref().map_or(Placed { cloud, sampling }, Smoothed::placed);
-        let normals = &at_points.normals;
+        let normals = &surface.at_points().normals;
         let winding = WindingNumbers::of(on.cloud, on.sampling, normals, observer)?;
         let closedness_by = |winding: &Option<WindingNumbers>| {
             Closedness::of(on.cloud, on.sampling, normals, winding.as_ref(), observer)
@@ -117,16 +98,17 @@ impl<'a> LocalField<'a> {
         // Softened numbers jump by less, but say less of which points have two sides.
         let winding = winding.map(|winding| winding.softened(SOFTENING));
         let jump = closedness_by(&winding)?.jump;
-        Ok((Self { cloud, sampling, at_points, winding, jump, side, is_open }, closedness))
+        let quadrics = Quadrics::of(surface, side);
+        Ok((Self { surface, quadrics, winding, jump, side, is_open }, closedness))
     }
 
     /// The feet of the points on their own quadrics, `[n, d]`: near the surface, and known without any work.
     pub fn feet_of_points(&self) -> Vec<f64> {
-        let foot = |(point, x): (usize, &[f64])| -> Small {
-            let height = self.at_points.heights[point];
-            x.iter().zip(self.normal(point)).map(|(x, c)| x - height * c).collect()
-        };
-        self.cloud.points().enumerate().flat_map(foot).collect()
+        let (cloud, geometry) = (self.surface.cloud(), self.surface.at_points());
+        let rows =
+            cloud.points().zip(geometry.normals.chunks_exact(cloud.dimension())).zip(&geometry.heights);
+        rows.flat_map(|((x, normal), height)| x.iter().zip(normal).map(move |(x, c)| x - height * c))
+            .collect()
     }
 
     /// Winding number at a place, with outward normals. 0 for a cloud of one position.
@@ -144,98 +126,50 @@ impl<'a> LocalField<'a> {
     }
 
     fn find(&self, x: &[f64], found: &mut Vec<Neighbour>) {
-        self.sampling.neighbours().nearest_positions_into(x, N_BLENDED, found);
+        self.surface.sampling().neighbours().nearest_in_tree_into(x, N_BLENDED, found);
     }
 
-    /// Blends the quadrics of some points at a place.
-    fn blend(&self, x: &[f64], near: &[Neighbour]) -> Blend {
-        let d = x.len();
-        let squared = |near: &Neighbour| squared_distance(x, self.cloud.point(near.point));
-        let (mut nearest, mut squared_nearest, mut farthest) = (0, f64::INFINITY, 0.0_f64);
-        for neighbour in near {
-            let squared = squared(neighbour);
-            farthest = farthest.max(squared);
-            if squared < squared_nearest {
-                (nearest, squared_nearest) = (neighbour.point, squared);
-            }
-        }
-        let spacing = self.sampling.spacing(nearest);
-        let distance = squared_nearest.sqrt();
-        let (mut total, mut height) = (0.0, 0.0);
-        let (mut gradient, mut normal, mut mean) = (zeros(d), zeros(d), zeros(d));
-        for neighbour in near.iter().filter(|near| self.at_points.is_known[near.point]) {
-            let weight = wendland(squared(neighbour), farthest);
-            let point = neighbour.point;
-            let (own, shape) = (self.normal(point), self.shape(point));
-            let weight = self.side * weight;
-            let delta: Small = x.iter().zip(self.cloud.point(point)).map(|(x, y)| x - y).collect();
-            let mut bend = 0.0;
-            for i in 0..d {
-                let row = dot(&shape[i * d..][..d], &delta);
-                bend += row * delta[i];
-                gradient[i] += weight * (own[i] + row);
-                normal[i] += weight * own[i];
-                mean[i] -= weight.abs() * delta[i];
-            }
-            height += weight * (self.at_points.heights[point] + dot(own, &delta) + 0.5 * bend);
-            total += weight.abs();
-        }
-        if total == 0.0 {
-            return Blend { height: 0.0, gradient, trust: 0.0, distance, spacing };
-        }
-        height /= total;
-        gradient.iter_mut().chain(&mut normal).chain(&mut mean).for_each(|c| *c /= total);
-        let agreement = norm(&normal);
-        // From the foot of x to the mean of the points.
-        let off: Small = mean.iter().zip(&normal).map(|(m, n)| m + height * n / agreement.max(0.1)).collect();
-        let trust = AGREEING.at(agreement) * FOOT.at(norm(&off) / spacing) * NEAR.at(distance / spacing);
-        Blend { height, gradient, trust, distance, spacing }
+    /// ρ: how far the blend is to be trusted.
+    fn trust(blend: &Blend) -> f64 {
+        let Blend { agreement, off, distance, spacing, .. } = blend;
+        AGREEING.at(*agreement) * FOOT.at(off / spacing) * NEAR.at(distance / spacing)
     }
 
     /// Whether the blend alone is the field.
     fn is_trusted(&self, blend: &Blend) -> bool {
-        blend.trust == 1.0 || self.is_open
+        self.is_open || Self::trust(blend) == 1.0
     }
 
     /// The signed distance, positive inside, of a blend that is not trusted alone.
     fn mixed(blend: &Blend, winding: f64) -> f64 {
+        let trust = Self::trust(blend);
         let by_winding = blend.distance * (1.0 - 2.0 * winding);
-        -(blend.trust * blend.height + (1.0 - blend.trust) * by_winding)
+        -(trust * blend.height + (1.0 - trust) * by_winding)
     }
 
     /// The value of f at a place.
     fn value(&self, x: &[f64], found: &mut Vec<Neighbour>) -> f64 {
         self.find(x, found);
-        let blend = self.blend(x, found);
+        let blend = self.quadrics.blend(&padded(x), found);
         if self.is_trusted(&blend) { -blend.height } else { Self::mixed(&blend, self.winding(x)) }
-    }
-
-    fn normal(&self, point: usize) -> &[f64] {
-        let d = self.cloud.dimension();
-        &self.at_points.normals[point * d..][..d]
-    }
-
-    fn shape(&self, point: usize) -> &[f64] {
-        let d = self.cloud.dimension();
-        &self.at_points.shapes[point * d * d..][..d * d]
     }
 
     /// The value and the gradient of f at a place. Off the surface, blends are differenced over the same
     /// points.
-    fn jet(&self, x: &[f64], found: &mut Vec<Neighbour>) -> (f64, Small) {
+    fn jet(&self, x: &[f64], found: &mut Vec<Neighbour>) -> (f64, Vector) {
         self.find(x, found);
-        let blend = self.blend(x, found);
+        let mut moved = padded(x);
+        let blend = self.quadrics.blend(&moved, found);
         if self.is_trusted(&blend) {
-            return (-blend.height, blend.gradient.iter().map(|g| -g).collect());
+            return (-blend.height, blend.gradient.map(|g| -g));
         }
         let (winding, slope) = self.winding_jet(x);
         let step = DIFFERENCE * blend.spacing;
-        let mut moved = Small::from_slice(x);
-        let mut gradient = zeros(x.len());
+        let mut gradient = [0.0; 3];
         for axis in 0..x.len() {
             let mut at = |by: f64| {
                 moved[axis] = x[axis] + by;
-                Self::mixed(&self.blend(&moved, found), winding + by * slope[axis])
+                Self::mixed(&self.quadrics.blend(&moved, found), winding + by * slope[axis])
             };
             let (ahead, behind) = (at(step), at(-step));
             moved[axis] = x[axis];
@@ -245,18 +179,9 @@ impl<'a> LocalField<'a> {
     }
 }
 
-/// Wendland's function (1 − r)⁴(4r + 1) of r = distance / farthest, both squared here.
-fn wendland(squared: f64, farthest: f64) -> f64 {
-    if farthest <= 0.0 {
-        return 1.0;
-    }
-    let r = (squared / farthest).sqrt().min(1.0);
-    (1.0 - r).powi(4) * (4.0 * r + 1.0)
-}
-
 impl Field for LocalField<'_> {
     fn dimension(&self) -> usize {
-        self.cloud.dimension()
+        self.surface.cloud().dimension()
     }
 
     fn values_at_once(&self, places: &[f64], _observer: &dyn Observer) -> Result<Vec<f64>> {
@@ -267,19 +192,19 @@ impl Field for LocalField<'_> {
     fn feet_at_once(&self, places: &[f64], _observer: &dyn Observer) -> Result<Feet> {
         let d = self.dimension();
         let rows = places.par_chunks_exact(d);
-        let jets: Vec<(f64, Small)> = rows.map_init(Vec::new, |found, x| self.jet(x, found)).collect();
+        let jets: Vec<(f64, Vector)> = rows.map_init(Vec::new, |found, x| self.jet(x, found)).collect();
         let mut feet = Feet::default();
         for (x, (f, gradient)) in places.chunks_exact(d).zip(&jets) {
             let length = norm(gradient);
             let per_length = if length > 0.0 { 1.0 / length } else { 0.0 };
             feet.positions.extend(x.iter().zip(gradient).map(|(x, g)| x - f * per_length * per_length * g));
-            feet.normals.extend(gradient.iter().map(|g| -g * per_length));
+            feet.normals.extend(gradient[..d].iter().map(|g| -g * per_length));
             feet.distances.push(f.abs() * per_length);
         }
         Ok(feet)
     }
 
     fn tolerance(&self) -> f64 {
-        TOLERANCE * self.sampling.scales().spacing
+        TOLERANCE * self.surface.sampling().scales().spacing
     }
 }

@@ -2,3 +2,4 @@
 
 pub mod interpolant;
 pub mod local;
+pub(crate) mod quadrics;
