@@ -404,6 +404,14 @@ impl PatchGeometry {
         }
     }
 
+    /// The feet of the points of the cloud that this is the geometry at, `[n, d]`: `x − hν`. Points without a
+    /// regression stay where they are.
+    pub(crate) fn feet(&self, cloud: &Cloud) -> Vec<f64> {
+        let rows = cloud.points().zip(self.normals.chunks_exact(cloud.dimension())).zip(&self.heights);
+        rows.flat_map(|((x, normal), height)| x.iter().zip(normal).map(move |(x, c)| x - height * c))
+            .collect()
+    }
+
     /// Bytes held on the heap.
     fn n_bytes(&self) -> usize {
         let vectors = [&self.normals, &self.shapes];

@@ -49,11 +49,7 @@ impl Smoothed {
         if noise < NOISY * sampling.scales().spacing || !are_like_noise(&geometry.heights) {
             return Ok(None);
         }
-        let d = cloud.dimension();
-        let rows = cloud.points().zip(geometry.normals.chunks_exact(d)).zip(&geometry.heights);
-        let feet =
-            rows.flat_map(|((x, normal), height)| x.iter().zip(normal).map(move |(x, n)| x - height * n));
-        let cloud = Cloud::new(feet.collect(), d)?;
+        let cloud = Cloud::new(geometry.feet(cloud), cloud.dimension())?;
         let sampling = Sampling::of(&cloud, observer)?;
         Ok(Some(Self { cloud, sampling }))
     }

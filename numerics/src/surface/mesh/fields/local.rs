@@ -104,11 +104,7 @@ impl<'a> LocalField<'a> {
 
     /// The feet of the points on their own quadrics, `[n, d]`: near the surface, and known without any work.
     pub fn feet_of_points(&self) -> Vec<f64> {
-        let (cloud, geometry) = (self.surface.cloud(), self.surface.at_points());
-        let rows =
-            cloud.points().zip(geometry.normals.chunks_exact(cloud.dimension())).zip(&geometry.heights);
-        rows.flat_map(|((x, normal), height)| x.iter().zip(normal).map(move |(x, c)| x - height * c))
-            .collect()
+        self.surface.at_points().feet(self.surface.cloud())
     }
 
     /// Winding number at a place, with outward normals. 0 for a cloud of one position.
