@@ -183,11 +183,11 @@ impl Patches {
         let lanes = InstructionSet::best().n_lanes();
         let slots = geometry.slots(d, lanes).into_par_iter().enumerate();
         slots.try_for_each_init(
-            || Room::new(self.count, d, lanes),
+            || Room::new(self, lanes),
             |room, (batch, mut slots)| {
                 observer.checkpoint()?;
                 let first = batch * lanes;
-                let places = room.put(self, queries, first..(first + lanes).min(m));
+                let places = room.put(queries, first..(first + lanes).min(m));
                 let estimates = self.estimates(room, &places, [&models, &stiff], are_points);
                 for (lane, (place, estimate)) in places.iter().zip(&estimates).enumerate() {
                     if let (Some(place), Some(estimate)) = (place, estimate) {
@@ -204,7 +204,7 @@ impl Patches {
     /// `stiff` models.
     fn estimates(
         &self,
-        room: &mut Room,
+        room: &mut Room<'_>,
         places: &[Option<Neighbourhood>],
         [models, stiff]: [&[Model]; 2],
         are_points: bool,

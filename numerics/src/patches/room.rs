@@ -12,7 +12,7 @@ use crate::machine::instruction_set::InstructionSet;
 use crate::machine::lanes::Workspace;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
-use crate::points::neighbours::Neighbour;
+use crate::points::neighbours::{Neighbour, Walk};
 
 /// A neighbourhood with the result of each model there.
 pub(super) type Found = (Neighbourhood, Vec<Kriged>);
@@ -25,7 +25,9 @@ pub(super) enum Purpose {
 }
 
 /// Buffers that a thread reuses from one batch to the next.
-pub(super) struct Room {
+pub(super) struct Room<'a> {
+    patches: &'a Patches,
+    walk: Walk<'a>,
     batch: Batch,
     workspace: Workspace,
     scratch: Scratch,
@@ -37,9 +39,12 @@ pub(super) struct Room {
     pub kriged: Vec<Vec<Kriged>>,
 }
 
-impl Room {
-    pub(super) fn new(count: usize, dimension: usize, lanes: usize) -> Self {
+impl<'a> Room<'a> {
+    pub(super) fn new(patches: &'a Patches, lanes: usize) -> Self {
+        let (dimension, count) = (patches.support.cloud().dimension(), patches.count);
         Self {
+            patches,
+            walk: Walk::over(patches.support.neighbours()),
             batch: Batch::new(dimension, count, lanes),
             workspace: workspace(dimension, count),
             scratch: Scratch::default(),
@@ -51,17 +56,12 @@ impl Room {
     }
 
     /// Fills the lanes with the neighbourhoods of a range of queries.
-    pub(super) fn put(
-        &mut self,
-        patches: &Patches,
-        queries: &Cloud,
-        range: Range<usize>,
-    ) -> Vec<Option<Neighbourhood>> {
-        let support = &patches.support;
+    pub(super) fn put(&mut self, queries: &Cloud, range: Range<usize>) -> Vec<Option<Neighbourhood>> {
+        let support = &self.patches.support;
         let mut places = Vec::with_capacity(range.len());
         for (lane, query) in range.enumerate() {
             let x = queries.point(query);
-            support.neighbours().nearest_positions_into(x, patches.count, &mut self.nearest);
+            self.walk.points_into(x, self.patches.count, &mut self.nearest);
             let place =
                 Neighbourhood::put(support, x, &mut self.nearest, &mut self.batch, lane, &mut self.scratch);
             if place.is_none() {
@@ -106,14 +106,14 @@ impl Patches {
         purpose: Purpose,
         observer: &dyn Observer,
     ) -> Result<Vec<Option<Found>>> {
-        let (m, d) = (queries.n_points(), queries.dimension());
+        let m = queries.n_points();
         let lanes = InstructionSet::best().n_lanes();
         let batches = (0..m.div_ceil(lanes)).into_par_iter().map_init(
-            || Room::new(self.count, d, lanes),
+            || Room::new(self, lanes),
             |room, batch| {
                 observer.checkpoint()?;
                 let first = batch * lanes;
-                let places = room.put(self, queries, first..(first + lanes).min(m));
+                let places = room.put(queries, first..(first + lanes).min(m));
                 room.krige(models, purpose);
                 let found = places.into_iter().enumerate();
                 Ok(found

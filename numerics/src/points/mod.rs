@@ -13,3 +13,4 @@ pub(crate) mod monomials;
 pub(crate) mod neighbourhoods;
 pub(crate) mod patch;
 pub(crate) mod quadric;
+pub(crate) mod tree_order;

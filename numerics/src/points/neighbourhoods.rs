@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::cloud::Cloud;
-use super::neighbours::{Neighbour, Neighbours};
+use super::neighbours::{Neighbour, Neighbours, Walk};
 use crate::error::Result;
 use crate::observer::Observer;
 
@@ -30,10 +30,10 @@ impl Neighbourhoods {
         let count = neighbours.nearest_positions(queries.point(0), count).len();
         let mut found = vec![Neighbour { point: 0, squared_distance: 0.0 }; queries.n_points() * count];
         found.par_chunks_exact_mut(count).enumerate().try_for_each_init(
-            Vec::new,
-            |nearest, (query, row)| {
+            || (Walk::over(neighbours), Vec::new()),
+            |(walk, nearest), (query, row)| {
                 observer.checkpoint()?;
-                neighbours.nearest_positions_into(queries.point(query), count, nearest);
+                walk.points_into(queries.point(query), count, nearest);
                 row.iter_mut().zip(nearest).for_each(|(slot, found)| *slot = *found);
                 Ok(())
             },

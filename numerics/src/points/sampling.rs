@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::cloud::{Cloud, squared_distance};
 use super::neighbours::{Distances, Neighbour, Neighbours};
+use super::tree_order::rows_at;
 use crate::error::Result;
 use crate::machine::heap::vec_bytes;
 use crate::machine::price::Price;
@@ -56,6 +57,13 @@ impl Sampling {
         }
         let means = if nearest.is_empty() { Vec::new() } else { spacings.clone() };
         Ok(Self { neighbours, spacings, scales: Scales::of(cloud, nearest, means) })
+    }
+
+    /// The sampling of the same points in the order of their tree.
+    pub(super) fn in_tree_order(&self) -> Self {
+        let Self { neighbours, spacings, scales } = self;
+        let spacings = rows_at(neighbours.order(), spacings, 1);
+        Self { neighbours: neighbours.in_own_order(), spacings, scales: *scales }
     }
 
     pub fn neighbours(&self) -> &Neighbours {

@@ -74,7 +74,8 @@ pub(crate) fn signature_surface_price(n_points: usize, dimension: usize) -> Pric
 pub(crate) fn local_surface_price(n_points: usize, dimension: usize) -> Price {
     let (n, coarse) = (n_points as f64, n_coarse(n_points));
     let of_coarse = FactorPrice::of(coarse, dimension).expected;
-    let per_point = 700 + 16 * dimension * dimension;
+    // The ordered points, with their tree and spacings, are 22 + 16 d.
+    let per_point = 722 + 16 * dimension * (dimension + 1);
     Price {
         n_bytes: n_points.saturating_mul(per_point).saturating_add(of_coarse.n_bytes),
         flops: choosing_flops(n_points, dimension)

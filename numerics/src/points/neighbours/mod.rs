@@ -5,6 +5,7 @@ mod grid;
 mod search;
 #[cfg(test)]
 mod tests;
+mod walk;
 
 use super::cloud::Cloud;
 use crate::error::Result;
@@ -12,6 +13,7 @@ use crate::machine::heap::vec_bytes;
 use crate::observer::Observer;
 
 pub(crate) use grid::on_grid;
+pub(crate) use walk::Walk;
 
 /// Positions per leaf. Scanning 12 of them costs about as much as two more levels of descent.
 const LEAF_SIZE: usize = 12;
@@ -80,6 +82,16 @@ impl Neighbours {
         &self.points[self.starts[position] as usize..self.starts[position + 1] as usize]
     }
 
+    /// The points in the order of the tree, `[n]`: position by position, ascending within a position.
+    pub(crate) fn order(&self) -> &[u32] {
+        &self.points
+    }
+
+    /// The same tree over the points in its order.
+    pub(crate) fn in_own_order(&self) -> Self {
+        Self { points: (0..self.points.len() as u32).collect(), ..self.clone() }
+    }
+
     fn coordinates_of(&self, position: usize) -> &[f64] {
         &self.coordinates[position * self.dimension..][..self.dimension]
     }
@@ -98,7 +110,7 @@ impl Neighbours {
 
     /// Writes the result of [`Neighbours::nearest`] into an existing list.
     pub fn nearest_into(&self, x: &[f64], count: usize, found: &mut Vec<Neighbour>) {
-        self.search(x, count, found);
+        self.search(x, count, f64::INFINITY, found);
         if self.points.len() == self.n_positions() {
             self.name_first_points(found);
         } else {
@@ -116,20 +128,14 @@ impl Neighbours {
 
     /// Writes the result of [`Neighbours::nearest_positions`] into an existing list.
     pub fn nearest_positions_into(&self, x: &[f64], count: usize, found: &mut Vec<Neighbour>) {
-        self.search(x, count, found);
+        self.search(x, count, f64::INFINITY, found);
         self.name_first_points(found);
-    }
-
-    /// Writes the `count` nearest positions, nearest first, as indices for [`Neighbours::points_at`]. Indices
-    /// of positions near each other are mostly near each other too.
-    pub(crate) fn nearest_in_tree_into(&self, x: &[f64], count: usize, found: &mut Vec<Neighbour>) {
-        self.search(x, count, found);
     }
 
     /// Returns the distances from a position to its `count` nearest others, or `None` if there are none.
     /// `found` is scratch space.
     pub fn distances(&self, position: usize, count: usize, found: &mut Vec<Neighbour>) -> Option<Distances> {
-        self.search(self.coordinates_of(position), count.saturating_add(1), found);
+        self.search(self.coordinates_of(position), count.saturating_add(1), f64::INFINITY, found);
         // The first entry is the position itself: no other has the distance 0.
         let others = found.get(1..)?;
         let distances = others.iter().map(|neighbour| neighbour.squared_distance.sqrt());

@@ -19,8 +19,8 @@ struct Search<'a> {
 
 impl Neighbours {
     /// Finds the `count` nearest positions as indices in the tree, nearest first, and writes them into
-    /// `found`.
-    pub(super) fn search(&self, x: &[f64], count: usize, found: &mut Vec<Neighbour>) {
+    /// `found`. There must be as many within `reach`, a squared distance as it is computed from x.
+    pub(super) fn search(&self, x: &[f64], count: usize, reach: f64, found: &mut Vec<Neighbour>) {
         found.clear();
         if count == 0 {
             return;
@@ -32,7 +32,7 @@ impl Neighbours {
             moved = x.iter().map(|&x| on_grid(x)).collect();
             &moved
         };
-        let (offsets, reach) = (zeros(self.dimension), f64::INFINITY);
+        let offsets = zeros(self.dimension);
         let mut search = Search { tree: self, x, count, offsets, reach, found };
         match self.dimension {
             2 => search.visit::<2>(0),
@@ -88,6 +88,7 @@ impl Search<'_> {
         self.offsets[..d].iter().map(|offset| offset * offset).sum()
     }
 
+    #[inline]
     fn offer(&mut self, candidate: Neighbour) {
         if candidate.squared_distance > self.reach {
             return;
@@ -104,6 +105,7 @@ impl Search<'_> {
     }
 
     /// Returns whether position a comes before b: it is nearer, or as near with an earlier first point.
+    #[inline]
     fn is_before(&self, a: &Neighbour, b: &Neighbour) -> bool {
         let first = |position: &Neighbour| self.tree.first_point(position.point);
         a.squared_distance < b.squared_distance

@@ -34,6 +34,16 @@ proptest! {
         prop_assert_eq!(tree.nearest(&query[..d], count), brute_force(&cloud, &query[..d], count));
         let grid: Vec<f64> = query[..d].iter().map(|x| x.round()).collect();
         prop_assert_eq!(tree.nearest(&grid, count), brute_force(&cloud, &grid, count));
+        for scale in [1.0, 1e-140] {
+            let cloud = Cloud::new(cloud.coordinates().iter().map(|x| scale * x).collect(), d).unwrap();
+            let tree = tree_of(&cloud);
+            let (mut walk, mut found) = (Walk::over(&tree), Vec::new());
+            for x in [&query[..d], &grid, &grid, cloud.point(0), &[100.0; 5][..d], cloud.point(n - 1)] {
+                let x: Vec<f64> = x.iter().map(|x| scale * x).collect();
+                walk.points_into(&x, count, &mut found);
+                prop_assert_eq!(&found, &tree.nearest_positions(&x, count));
+            }
+        }
     }
 }
 
@@ -49,6 +59,11 @@ proptest! {
         let cloud = Cloud::new(coordinates[..n * d].to_vec(), d).unwrap();
         let tree = tree_of(&cloud);
         prop_assert_eq!(tree.nearest(&query[..d], count), brute_force(&cloud, &query[..d], count));
+        let (mut walk, mut found) = (Walk::over(&tree), Vec::new());
+        for x in cloud.points() {
+            walk.points_into(x, count, &mut found);
+            prop_assert_eq!(&found, &brute_force(&cloud, x, count));
+        }
     }
 }
 

@@ -24,6 +24,7 @@ use crate::points::cloud::Cloud;
 use crate::points::neighbourhoods::Neighbourhoods;
 use crate::points::neighbours::Neighbour;
 use crate::points::sampling::Sampling;
+use crate::points::tree_order::TreeOrder;
 use coarse::outward_directions;
 use smoothed::{Placed, Smoothed};
 use sure::least_ratio;
@@ -92,11 +93,13 @@ pub struct Given<'a> {
 pub struct LocalSurface {
     cloud: Arc<Cloud>,
     sampling: Arc<Sampling>,
+    /// The points as the work goes over them. What belongs to points here is in their order.
+    ordered: TreeOrder,
     patches: Patches,
-    /// Geometry of the patches at the points, normals outward.
+    /// Geometry of the patches at the ordered points, normals outward.
     at_points: PatchGeometry,
     orientation: SurfaceOrientation,
-    /// True where the evidence for the side of a point is contradictory, `[n]`.
+    /// True where the evidence for the side of an ordered point is contradictory, `[n]`.
     is_ambiguous: Vec<bool>,
     radius: f64,
     /// Least ratio of a curvature to its deviation at which the curvature counts as known.
@@ -115,7 +118,8 @@ impl LocalSurface {
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
         observer.enter(Stage::Evaluate);
-        let (own, near) = (cloud.clone(), sampling.clone());
+        let ordered = TreeOrder::of(&cloud, sampling.clone())?;
+        let (own, near) = (ordered.cloud.clone(), ordered.sampling.clone());
         let (patches, known) = match given.learning {
             None => (Patches::of(own, near, observer)?, None),
             Some(Learning::AtSites(sites)) => (Patches::learned_at(sites, own, near, observer)?, None),
@@ -123,9 +127,17 @@ impl LocalSurface {
                 (Patches::with(&known.regression, own, near, observer)?, Some(known))
             }
         };
-        let mut at_points = patches.at(&cloud, true, true, observer)?;
-        let oriented = orient(&cloud, &sampling, &patches, &at_points, given.normals, observer)?;
+        let mut at_points = patches.at(&ordered.cloud, true, true, observer)?;
         let d = cloud.dimension();
+        let directions = match given.normals {
+            Some(normals) => ordered.own_rows(normals.coordinates(), d),
+            None => outward_directions(&ordered.cloud, patches.noise(), observer)?,
+        };
+        let sides = Sides { directions, are_given: given.normals.is_some() };
+        let points = Placed { cloud: &ordered.cloud, sampling: &ordered.sampling };
+        let smoothed = Smoothed::of_noisy(points, &at_points, patches.noise(), observer)?;
+        let on = smoothed.as_ref().map_or(points, Smoothed::placed);
+        let oriented = orient(on, &at_points, &sides, observer)?;
         let outward = |point: usize| &oriented.normals[point * d..][..d];
         at_points.turn(|point, normal| if dot(outward(point), normal) < 0.0 { -1.0 } else { 1.0 });
         let (orientation, is_ambiguous) = (oriented.how, oriented.is_ambiguous);
@@ -139,7 +151,17 @@ impl LocalSurface {
                 (radius, least_ratio(&ratios))
             }
         };
-        Ok(Self { cloud, sampling, patches, at_points, orientation, is_ambiguous, radius, least_ratio })
+        Ok(Self {
+            cloud,
+            sampling,
+            ordered,
+            patches,
+            at_points,
+            orientation,
+            is_ambiguous,
+            radius,
+            least_ratio,
+        })
     }
 
     pub fn cloud(&self) -> &Cloud {
@@ -154,7 +176,12 @@ impl LocalSurface {
         &self.sampling
     }
 
-    /// Geometry at the points, with outward normals.
+    /// The points in the order of [`LocalSurface::at_points`].
+    pub(crate) fn ordered(&self) -> Placed<'_> {
+        Placed { cloud: &self.ordered.cloud, sampling: &self.ordered.sampling }
+    }
+
+    /// Geometry at the ordered points, with outward normals.
     pub(crate) fn at_points(&self) -> &PatchGeometry {
         &self.at_points
     }
@@ -165,8 +192,7 @@ impl LocalSurface {
 
     /// Returns the feet of the points, unless the points tell their sides as well.
     pub(crate) fn smoothed(&self, observer: &dyn Observer) -> Result<Option<Smoothed>, NumericsError> {
-        let points = Placed { cloud: &self.cloud, sampling: &self.sampling };
-        Smoothed::of_noisy(points, &self.at_points, self.patches.noise(), observer)
+        Smoothed::of_noisy(self.ordered(), &self.at_points, self.patches.noise(), observer)
     }
 
     /// Returns what the regressions learned, or were given.
@@ -213,7 +239,7 @@ impl LocalSurface {
         if directions.n_points() != n {
             return Err(NumericsError::LengthMismatch { expected: n, found: directions.n_points() });
         }
-        let mut normals = self.at_points.normals.clone();
+        let mut normals = self.ordered.given_rows(&self.at_points.normals, d);
         let along = normals.chunks_exact_mut(d).zip(directions.points());
         let has_sign: Vec<bool> = along.map(|(normal, direction)| turn_along(normal, direction)).collect();
         let (cloud, sampling) = (&self.cloud, &self.sampling);
@@ -223,6 +249,7 @@ impl LocalSurface {
     /// Bytes held on the heap beside the cloud and its sampling.
     pub fn n_bytes(&self) -> usize {
         self.patches.n_bytes()
+            + self.ordered.n_bytes()
             + self.at_points.n_bytes()
             + vec_bytes(&self.is_ambiguous)
             + block_bytes(arc_payload::<Self>())
@@ -240,14 +267,12 @@ impl LocalSurface {
     ) -> Result<Served, NumericsError> {
         observer.enter(Stage::Evaluate);
         let are_points = *queries == *self.cloud;
-        let found;
-        let geometry = match are_points {
-            true => &self.at_points,
+        let (geometry, of_sides) = match are_points {
+            true => (self.at_points.given(&self.ordered), self.doubts_of_points()),
             false => {
-                let mut own = self.patches.at(queries, false, true, observer)?;
-                self.turn_outward(queries, &mut own);
-                found = own;
-                &found
+                let mut geometry = self.patches.at(queries, false, true, observer)?;
+                self.turn_outward(queries, &mut geometry);
+                (geometry, self.doubts_of_sides(queries))
             }
         };
         let (m, d) = (queries.n_points(), queries.dimension());
@@ -257,48 +282,55 @@ impl LocalSurface {
             Orientation::Gradient => -1.0,
         };
         let verdict = |query: usize| {
-            let reason = self.reason(queries.point(query), geometry, query, request, are_points);
+            let reason = self.reason(&geometry, query, request, of_sides[query]);
             Verdict { sign, by: ServedBy::Local, reason }
         };
         Ok(Served {
             dimension: d,
-            gradients: geometry.normals.clone(),
-            hessians: geometry.shapes.clone(),
             verdicts: (0..m).into_par_iter().map(verdict).collect(),
             levels: geometry.heights.iter().map(|height| 1.0 - height).collect(),
-            deviations: request.has_deviations.then(|| deviations(geometry, sign, d)),
+            deviations: request.has_deviations.then(|| deviations(&geometry, sign, d)),
+            gradients: geometry.normals,
+            hessians: geometry.shapes,
         })
     }
 
+    /// Whether the sides of the given points are in doubt, `[n]`.
+    fn doubts_of_points(&self) -> Vec<Option<DegeneracyReason>> {
+        let doubt = |&is: &bool| is.then_some(DegeneracyReason::AmbiguousSide);
+        self.ordered.given_rows(&self.is_ambiguous.iter().map(doubt).collect::<Vec<_>>(), 1)
+    }
+
+    /// Whether the sides of other places are in doubt, `[m]`, which they have from the nearest point.
+    fn doubts_of_sides(&self, places: &Cloud) -> Vec<Option<DegeneracyReason>> {
+        let Placed { sampling, .. } = self.ordered();
+        let doubt = |found: &mut Vec<Neighbour>, place: usize| {
+            sampling.neighbours().nearest_into(places.point(place), 1, found);
+            let is_near = |found: &&Neighbour| !is_far(found.squared_distance, sampling.spacing(found.point));
+            match found.first().filter(is_near) {
+                None => Some(DegeneracyReason::FarFromCloud),
+                Some(found) => self.is_ambiguous[found.point].then_some(DegeneracyReason::AmbiguousSide),
+            }
+        };
+        (0..places.n_points()).into_par_iter().map_init(Vec::new, doubt).collect()
+    }
+
+    /// Why an answer is null or doubtful, if it is. `of_side` says whether its side is in doubt.
     fn reason(
         &self,
-        x: &[f64],
         geometry: &PatchGeometry,
         query: usize,
         request: &GeometryRequest,
-        is_point: bool,
+        of_side: Option<DegeneracyReason>,
     ) -> Option<DegeneracyReason> {
         if !geometry.is_known[query] {
             return Some(DegeneracyReason::VanishingGradient);
-        }
-        let mut point = query;
-        if !is_point {
-            let nearest = self.sampling.neighbours().nearest(x, 1);
-            let is_near =
-                |found: &&Neighbour| !is_far(found.squared_distance, self.sampling.spacing(found.point));
-            let Some(found) = nearest.first().filter(is_near) else {
-                return Some(DegeneracyReason::FarFromCloud);
-            };
-            point = found.point;
-        }
-        if self.is_ambiguous[point] {
-            return Some(DegeneracyReason::AmbiguousSide);
         }
         let is_resolved = match request.checks_curvatures {
             true => self.is_resolved(geometry, query),
             false => geometry.normal_deviations[query] <= UNCERTAIN_NORMAL,
         };
-        (!is_resolved).then_some(DegeneracyReason::UnderResolved)
+        of_side.or_else(|| (!is_resolved).then_some(DegeneracyReason::UnderResolved))
     }
 
     /// Returns whether the curvatures are known well enough to be used.
@@ -311,7 +343,7 @@ impl LocalSurface {
     fn turn_outward(&self, queries: &Cloud, geometry: &mut PatchGeometry) {
         let mut found = Vec::new();
         geometry.turn(|query, normal| {
-            let near = NearNormals { sampling: &self.sampling, normals: &self.at_points.normals };
+            let near = NearNormals { sampling: &self.ordered.sampling, normals: &self.at_points.normals };
             if near.along(queries.point(query), normal, &mut found) < 0.0 { -1.0 } else { 1.0 }
         });
     }
@@ -331,32 +363,31 @@ fn ratio(geometry: &PatchGeometry, query: usize, d: usize, radius: f64) -> Optio
     (geometry.is_known[query] && !ratio.is_nan()).then_some(ratio)
 }
 
-/// Orients the normals of patches, by whole regions, along given normals or a coarse signature function.
+/// What says the sides of points.
+struct Sides {
+    /// Outward directions, `[n, d]`, of any length.
+    directions: Vec<f64>,
+    /// True if a client gave them, false if they are of a coarse signature function.
+    are_given: bool,
+}
+
+/// Orients the normals of patches, by whole regions of the points or their feet.
 fn orient(
-    cloud: &Cloud,
-    sampling: &Sampling,
-    patches: &Patches,
+    on: Placed<'_>,
     geometry: &PatchGeometry,
-    given: Option<&Cloud>,
+    sides: &Sides,
     observer: &dyn Observer,
 ) -> Result<Oriented, NumericsError> {
-    let (n, d) = (cloud.n_points(), cloud.dimension());
-    let outward = match given {
-        Some(given) => given.coordinates().to_vec(),
-        None => outward_directions(cloud, patches.noise(), observer)?,
-    };
+    let Placed { cloud, sampling } = on;
+    let d = cloud.dimension();
     let mut normals = geometry.normals.clone();
-    let mut has_sign = vec![false; n];
-    for (point, normal) in normals.chunks_exact_mut(d).enumerate() {
-        has_sign[point] = turn_along(normal, &outward[point * d..][..d]);
-    }
-    let smoothed = Smoothed::of_noisy(Placed { cloud, sampling }, geometry, patches.noise(), observer)?;
-    let Placed { cloud, sampling } = smoothed.as_ref().map_or(Placed { cloud, sampling }, Smoothed::placed);
+    let along = normals.chunks_exact_mut(d).zip(sides.directions.chunks_exact(d));
+    let has_sign = along.map(|(normal, direction)| turn_along(normal, direction)).collect();
     let count = super::orientation::n_around(cloud);
     let around = Neighbourhoods::of(sampling.neighbours(), cloud, count, observer)?;
     let directions = Directions { normals, has_sign, is_at_rim: geometry.is_at_rim.clone() };
     let sampled = Sampled { cloud, sampling, around: &around, observer };
-    Oriented::of_directions(&sampled, directions, given.is_some())
+    Oriented::of_directions(&sampled, directions, sides.are_given)
 }
 
 /// Turns a normal to the side of a direction. Returns whether the direction says something of the side.
@@ -410,6 +441,27 @@ impl PatchGeometry {
         let rows = cloud.points().zip(self.normals.chunks_exact(cloud.dimension())).zip(&self.heights);
         rows.flat_map(|((x, normal), height)| x.iter().zip(normal).map(move |(x, c)| x - height * c))
             .collect()
+    }
+
+    /// The same of ordered points in the order in which they were given.
+    fn given(&self, ordered: &TreeOrder) -> Self {
+        let d = ordered.cloud.dimension();
+        let curvatures = self.curvatures.as_ref().map(|own| CurvatureDeviations {
+            principal: ordered.given_rows(&own.principal, d - 1),
+            mean: ordered.given_rows(&own.mean, 1),
+            gaussian: ordered.given_rows(&own.gaussian, 1),
+            is_bent: ordered.given_rows(&own.is_bent, 1),
+        });
+        Self {
+            is_known: ordered.given_rows(&self.is_known, 1),
+            normals: ordered.given_rows(&self.normals, d),
+            shapes: ordered.given_rows(&self.shapes, d * d),
+            is_at_rim: ordered.given_rows(&self.is_at_rim, 1),
+            heights: ordered.given_rows(&self.heights, 1),
+            height_deviations: ordered.given_rows(&self.height_deviations, 1),
+            normal_deviations: ordered.given_rows(&self.normal_deviations, 1),
+            curvatures,
+        }
     }
 
     /// Bytes held on the heap.

@@ -19,9 +19,9 @@ use crate::error::Result;
 use crate::machine::small::{Small, zeros};
 use crate::machine::vector::norm;
 use crate::observer::Observer;
-use crate::points::neighbours::Neighbour;
+use crate::points::neighbours::Walk;
 use crate::surface::local::LocalSurface;
-use crate::surface::local::smoothed::{Placed, Smoothed};
+use crate::surface::local::smoothed::Smoothed;
 use crate::surface::mesh::closedness::Closedness;
 use crate::surface::mesh::field::{Feet, Field};
 use crate::surface::mesh::fields::quadrics::{Blend, Quadrics, Vector, padded};
@@ -35,10 +35,11 @@ const N_BLENDED: usize = 13;
 const AGREEING: Ramp = Ramp { zero: 0.7, one: 0.95 };
 
 /// Distance of the foot from the mean of the points, in spacings.
-const FOOT: Ramp = Ramp { zero: 1.6, one: 1.1 };
+const FOOT: Ramp = Ramp { zero: 1.2, one: 0.8 };
 
-/// Distance from the cloud, in spacings.
-const NEAR: Ramp = Ramp { zero: 2.0, one: 1.0 };
+/// Distance from the cloud, in spacings. Down to 1.3 and 0.6, scans have bubbles where jumps of the winding
+/// numbers decide.
+const NEAR: Ramp = Ramp { zero: 1.5, one: 0.7 };
 
 /// Softening length of winding numbers over the width of a point's area.
 const SOFTENING: f64 = 0.8;
@@ -85,9 +86,8 @@ impl<'a> LocalField<'a> {
         is_open: bool,
         observer: &dyn Observer,
     ) -> Result<(Self, Closedness)> {
-        let (cloud, sampling) = (surface.cloud(), surface.sampling());
         let smoothed = surface.smoothed(observer)?;
-        let on = smoothed.as_ref().map_or(Placed { cloud, sampling }, Smoothed::placed);
+        let on = smoothed.as_ref().map_or(surface.ordered(), Smoothed::placed);
         let normals = &surface.at_points().normals;
         let winding = WindingNumbers::of(on.cloud, on.sampling, normals, observer)?;
         let closedness_by = |winding: &Option<WindingNumbers>| {
@@ -104,7 +104,7 @@ impl<'a> LocalField<'a> {
 
     /// The feet of the points on their own quadrics, `[n, d]`: near the surface, and known without any work.
     pub fn feet_of_points(&self) -> Vec<f64> {
-        self.surface.at_points().feet(self.surface.cloud())
+        self.surface.at_points().feet(self.surface.ordered().cloud)
     }
 
     /// Winding number at a place, with outward normals. 0 for a cloud of one position.
@@ -121,8 +121,8 @@ impl<'a> LocalField<'a> {
         (factor * value, gradient)
     }
 
-    fn find(&self, x: &[f64], found: &mut Vec<Neighbour>) {
-        self.surface.sampling().neighbours().nearest_in_tree_into(x, N_BLENDED, found);
+    fn walk(&self) -> Walk<'_> {
+        Walk::over(self.surface.ordered().sampling.neighbours())
     }
 
     /// ρ: how far the blend is to be trusted.
@@ -144,16 +144,15 @@ impl<'a> LocalField<'a> {
     }
 
     /// The value of f at a place.
-    fn value(&self, x: &[f64], found: &mut Vec<Neighbour>) -> f64 {
-        self.find(x, found);
-        let blend = self.quadrics.blend(&padded(x), found);
+    fn value(&self, x: &[f64], walk: &mut Walk<'_>) -> f64 {
+        let blend = self.quadrics.blend(&padded(x), walk.positions(x, N_BLENDED));
         if self.is_trusted(&blend) { -blend.height } else { Self::mixed(&blend, self.winding(x)) }
     }
 
     /// The value and the gradient of f at a place. Off the surface, blends are differenced over the same
     /// points.
-    fn jet(&self, x: &[f64], found: &mut Vec<Neighbour>) -> (f64, Vector) {
-        self.find(x, found);
+    fn jet(&self, x: &[f64], walk: &mut Walk<'_>) -> (f64, Vector) {
+        let found = walk.positions(x, N_BLENDED);
         let mut moved = padded(x);
         let blend = self.quadrics.blend(&moved, found);
         if self.is_trusted(&blend) {
@@ -182,13 +181,13 @@ impl Field for LocalField<'_> {
 
     fn values_at_once(&self, places: &[f64], _observer: &dyn Observer) -> Result<Vec<f64>> {
         let rows = places.par_chunks_exact(self.dimension());
-        Ok(rows.map_init(Vec::new, |found, x| self.value(x, found)).collect())
+        Ok(rows.map_init(|| self.walk(), |walk, x| self.value(x, walk)).collect())
     }
 
     fn feet_at_once(&self, places: &[f64], _observer: &dyn Observer) -> Result<Feet> {
         let d = self.dimension();
         let rows = places.par_chunks_exact(d);
-        let jets: Vec<(f64, Vector)> = rows.map_init(Vec::new, |found, x| self.jet(x, found)).collect();
+        let jets: Vec<(f64, Vector)> = rows.map_init(|| self.walk(), |walk, x| self.jet(x, walk)).collect();
         let mut feet = Feet::default();
         for (x, (f, gradient)) in places.chunks_exact(d).zip(&jets) {
             let length = norm(gradient);

@@ -1,7 +1,10 @@
 //! The quadrics of the points of a local surface, those of neighbours near each other in memory.
 
+use rayon::prelude::*;
+
 use crate::points::neighbours::Neighbour;
 use crate::surface::local::LocalSurface;
+use crate::surface::local::smoothed::Placed;
 
 /// A vector of space. Those of the plane have 0 as their third component.
 pub type Vector = [f64; 3];
@@ -56,9 +59,9 @@ pub struct Blend {
 impl Quadrics {
     /// Lays the quadrics of a surface out. `side` is −1 if its normals point inward.
     pub fn of(surface: &LocalSurface, side: f64) -> Self {
-        let tree = surface.sampling().neighbours();
+        let tree = surface.ordered().sampling.neighbours();
         let of_position = |position: usize| quadric(surface, tree.points_at(position)[0] as usize, side);
-        Self((0..tree.n_positions()).map(of_position).collect())
+        Self((0..tree.n_positions()).into_par_iter().map(of_position).collect())
     }
 
     /// Blends the quadrics of some positions at a place.
@@ -100,17 +103,17 @@ impl Quadrics {
 }
 
 fn quadric(surface: &LocalSurface, point: usize, side: f64) -> Quadric {
-    let d = surface.cloud().dimension();
-    let geometry = surface.at_points();
+    let Placed { cloud, sampling } = surface.ordered();
+    let (d, geometry) = (cloud.dimension(), surface.at_points());
     let shape = &geometry.shapes[point * d * d..][..d * d];
     let entry = |row: usize, column: usize| if column < d { side * shape[row * d + column] } else { 0.0 };
     let normal = padded(&geometry.normals[point * d..][..d]);
     Quadric {
-        at: padded(surface.cloud().point(point)),
+        at: padded(cloud.point(point)),
         normal: normal.map(|c| side * c),
         height: side * geometry.heights[point],
         shape: [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)],
-        spacing: surface.sampling().spacing(point),
+        spacing: sampling.spacing(point),
         is_known: geometry.is_known[point],
     }
 }
