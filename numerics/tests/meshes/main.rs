@@ -229,16 +229,17 @@ fn noise_does_not_tear_the_surface() {
 #[test]
 fn a_hole_is_bridged_and_said() {
     let whole = fibonacci_sphere(2000);
-    let points: Vec<f64> = whole.points().filter(|x| x[2] < 0.95).flatten().copied().collect();
+    let points: Vec<f64> = whole.points().filter(|x| x[2] < 0.9).flatten().copied().collect();
     let (found, _) = meshed(&local(Cloud::new(points, 3).unwrap()), &OPTIONS);
     assert_eq!((found.parts[0].euler_characteristic, found.parts[0].n_boundary_edges), (2, 0));
     let bridged = found.support.iter().zip(found.mesh.vertices.chunks_exact(3));
     let mut n_bridged = 0;
     for (_, x) in bridged.filter(|(support, _)| **support == Support::Bridged) {
-        assert!(x[2] > 0.9, "{x:?}");
+        assert!(x[2] > 0.85, "{x:?}");
         n_bridged += 1;
     }
-    assert!(n_bridged > 10, "{n_bridged}");
+    // The hole is 11 spacings wide, and two at its rim count as observed: 38 squares of a spacing are left.
+    assert!(n_bridged > 20, "{n_bridged}");
 }
 
 #[test]

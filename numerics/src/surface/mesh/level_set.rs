@@ -68,11 +68,15 @@ pub fn level_set(request: &LevelSetRequest<'_>, observer: &dyn Observer) -> Resu
     observer.enter(Stage::Evaluate);
     let field = request.field;
     let raw = raw_mesh(request, observer)?;
-    let (raw, dropped) = without_specks(raw, request);
+    let (raw, parts, dropped) = without_specks(raw, request);
     let (mesh, quality) = match request.quality {
         Quality::Regular if raw.dimension == 3 => {
             let mesh = regular(&raw, field, request.step, observer)?;
-            if has_topology_of(&mesh, &raw) { (mesh, Quality::Regular) } else { (raw, Quality::Raw) }
+            if topology(&Parts::of(&mesh).parts) == topology(&parts) {
+                (mesh, Quality::Regular)
+            } else {
+                (raw, Quality::Raw)
+            }
         }
         quality => (raw, quality),
     };
@@ -88,31 +92,31 @@ const MAX_STEPS: usize = 6;
 /// Part of a step up to which a vertex counts as on the surface.
 const SETTLED: f64 = 1e-10;
 
-/// Moves the vertices onto the surface, until all are as near as `enough`, L, or come no nearer.
+/// Moves each vertex onto the surface, until it is as near as `enough`, L, or comes no nearer.
 fn settled(mut mesh: Mesh, field: &dyn Field, enough: f64, observer: &dyn Observer) -> Result<(Mesh, Feet)> {
     let mut feet = field.feet(&mesh.vertices, observer)?;
     let d = mesh.dimension;
+    let mut moving: Vec<usize> = (0..mesh.n_vertices()).collect();
     for _ in 0..MAX_STEPS {
-        let worst = feet.distances.iter().copied().fold(0.0, f64::max);
-        if worst <= enough {
+        moving.retain(|&vertex| feet.distances[vertex] > enough);
+        if moving.is_empty() {
             break;
         }
-        let next = field.feet(&feet.positions, observer)?;
-        let mut has_moved = false;
-        for vertex in 0..mesh.n_vertices() {
-            if next.distances[vertex] >= feet.distances[vertex] {
-                continue;
-            }
-            let range = vertex * d..(vertex + 1) * d;
-            mesh.vertices[range.clone()].copy_from_slice(&feet.positions[range.clone()]);
-            feet.positions[range.clone()].copy_from_slice(&next.positions[range.clone()]);
-            feet.normals[range.clone()].copy_from_slice(&next.normals[range]);
-            feet.distances[vertex] = next.distances[vertex];
-            has_moved = true;
-        }
-        if !has_moved {
-            break;
-        }
+        let places: Vec<f64> =
+            moving.iter().flat_map(|&vertex| &feet.positions[vertex * d..][..d]).copied().collect();
+        let next = field.feet(&places, observer)?;
+        let mut at = 0..moving.len();
+        moving.retain(|&vertex| {
+            let Some(at) = at.next().filter(|&at| next.distances[at] < feet.distances[vertex]) else {
+                return false;
+            };
+            let (own, found) = (vertex * d..(vertex + 1) * d, at * d..(at + 1) * d);
+            mesh.vertices[own.clone()].copy_from_slice(&feet.positions[own.clone()]);
+            feet.positions[own.clone()].copy_from_slice(&next.positions[found.clone()]);
+            feet.normals[own].copy_from_slice(&next.normals[found]);
+            feet.distances[vertex] = next.distances[at];
+            true
+        });
     }
     Ok((mesh, feet))
 }
@@ -154,20 +158,20 @@ const LEAST_SIZE: f64 = 2.0;
 const LEAST_OWN: f64 = 0.5;
 
 /// Leaves out parts that are too small to mean anything, or that have no points of their own near them.
-/// Returns them too.
-fn without_specks(mesh: Mesh, request: &LevelSetRequest<'_>) -> (Mesh, Vec<Part>) {
+/// Returns what is left, with its parts, and what was left out.
+fn without_specks(mesh: Mesh, request: &LevelSetRequest<'_>) -> (Mesh, Vec<Part>, Vec<Part>) {
     let least = LEAST_SIZE
         * mesh.dimension as f64
         * request.sampling.scales().spacing.powi(mesh.dimension as i32 - 1);
     let Parts { parts, of_vertex } = Parts::of(&mesh);
     let mut is_kept = supported(&mesh, &parts, &of_vertex, request.sampling);
     is_kept.iter_mut().zip(&parts).for_each(|(is_kept, part)| *is_kept &= part.area >= least);
-    let dropped: Vec<Part> =
-        parts.iter().zip(&is_kept).filter(|(_, is_kept)| !**is_kept).map(|(part, _)| *part).collect();
+    let mut kept = is_kept.iter();
+    let (kept, dropped): (Vec<Part>, Vec<Part>) = parts.iter().partition(|_| kept.next() == Some(&true));
     if dropped.is_empty() {
-        return (mesh, dropped);
+        return (mesh, kept, dropped);
     }
-    (mesh.filtered(|cell| is_kept[of_vertex[cell[0] as usize] as usize]), dropped)
+    (mesh.filtered(|cell| is_kept[of_vertex[cell[0] as usize] as usize]), kept, dropped)
 }
 
 /// A vertex of a part, with the point nearest to it.
@@ -215,15 +219,10 @@ fn own_points(nearest: &[Neighbour], part_of: &[u32], n_parts: usize) -> Vec<f64
     n_own
 }
 
-/// Whether two meshes have equally many parts, each with the same Euler characteristic and both closed or
-/// not.
-fn has_topology_of(mesh: &Mesh, other: &Mesh) -> bool {
-    let of = |mesh: &Mesh| {
-        let parts = Parts::of(mesh).parts;
-        let mut of: Vec<(i64, bool)> =
-            parts.iter().map(|part| (part.euler_characteristic, part.n_boundary_edges == 0)).collect();
-        of.sort_unstable();
-        of
-    };
-    of(mesh) == of(other)
+/// The Euler characteristic of each part, and whether it is closed, sorted.
+fn topology(parts: &[Part]) -> Vec<(i64, bool)> {
+    let of = |part: &Part| (part.euler_characteristic, part.n_boundary_edges == 0);
+    let mut found: Vec<(i64, bool)> = parts.iter().map(of).collect();
+    found.sort_unstable();
+    found
 }

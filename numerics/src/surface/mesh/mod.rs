@@ -16,6 +16,8 @@ mod regular;
 mod support;
 pub mod surface;
 
+use rayon::prelude::*;
+
 pub use closedness::{Closedness, DOUBTFUL, OPEN};
 pub use lattice::follow::Bounds;
 pub use level_set::{LevelSet, LevelSetRequest, Quality, level_set};
@@ -101,7 +103,7 @@ impl Mesh {
                 self.cells().flat_map(of_triangle).map(|[a, b]| [a.min(b), a.max(b)]).collect()
             }
         };
-        facets.sort_unstable();
+        facets.par_sort_unstable();
         facets
     }
 

@@ -137,7 +137,7 @@ pub fn follow(
             return Err(NumericsError::TooManyNodes { limit: max_nodes });
         }
         observer.checkpoint()?;
-        let places: Vec<f64> = new.iter().flat_map(|&node| lattice.position(node)).collect();
+        let places: Vec<f64> = new.par_iter().flat_map_iter(|&node| lattice.position(node)).collect();
         let values = field.values(&places, observer)?;
         samples.merge(&new, &values);
         let crossed: Vec<(Node, [f64; 8])> = front

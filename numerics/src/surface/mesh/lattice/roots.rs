@@ -42,7 +42,7 @@ impl<'a> Crossings<'a> {
             let tolerance = field.tolerance().max(precision * (f_low - f_high).abs());
             Bracket { edge, low: 0.0, high: 1.0, f_low, f_high, tolerance }
         };
-        let mut open: Vec<Bracket> = edges.iter().enumerate().map(bracket).collect();
+        let mut open: Vec<Bracket> = edges.par_iter().enumerate().map(bracket).collect();
         let mut roots = vec![0.0; edges.len()];
         for round in 0..MAX_ROUNDS {
             if open.is_empty() {
@@ -50,9 +50,9 @@ impl<'a> Crossings<'a> {
             }
             observer.checkpoint()?;
             let guesses: Vec<f64> = open.iter().map(|bracket| bracket.guess(round)).collect();
-            let on_edges = open.iter().zip(&guesses);
+            let on_edges = open.par_iter().zip(&guesses);
             let places: Vec<f64> =
-                on_edges.flat_map(|(bracket, &t)| along(lattice, edges[bracket.edge], t)).collect();
+                on_edges.flat_map_iter(|(bracket, &t)| along(lattice, edges[bracket.edge], t)).collect();
             let values = field.values(&places, observer)?;
             for (bracket, (&t, &f)) in open.iter_mut().zip(guesses.iter().zip(&values)) {
                 roots[bracket.edge] = t;
@@ -61,7 +61,7 @@ impl<'a> Crossings<'a> {
             let mut magnitudes = values.iter().map(|f| f.abs());
             open.retain(|bracket| magnitudes.next().is_some_and(|f| f > bracket.tolerance));
         }
-        Ok(edges.iter().zip(roots).flat_map(|(&edge, t)| along(lattice, edge, t)).collect())
+        Ok(edges.par_iter().zip(roots).flat_map_iter(|(&edge, t)| along(lattice, edge, t)).collect())
     }
 }
 
