@@ -13,4 +13,3 @@ pub(crate) mod monomials;
 pub(crate) mod neighbourhoods;
 pub(crate) mod patch;
 pub(crate) mod quadric;
-pub(crate) mod tree_order;

@@ -4,7 +4,6 @@ use rayon::prelude::*;
 
 use super::cloud::{Cloud, squared_distance};
 use super::neighbours::{Distances, Neighbour, Neighbours};
-use super::tree_order::rows_at;
 use crate::error::Result;
 use crate::machine::heap::vec_bytes;
 use crate::machine::price::Price;
@@ -60,9 +59,9 @@ impl Sampling {
     }
 
     /// The sampling of the same points in the order of their tree.
-    pub(super) fn in_tree_order(&self) -> Self {
+    pub(crate) fn in_tree_order(&self) -> Self {
         let Self { neighbours, spacings, scales } = self;
-        let spacings = rows_at(neighbours.order(), spacings, 1);
+        let spacings = neighbours.rows_in_order(spacings, 1);
         Self { neighbours: neighbours.in_own_order(), spacings, scales: *scales }
     }
 

@@ -87,6 +87,13 @@ impl Neighbours {
         &self.points
     }
 
+    /// Rows `[n, width]` of the points in the order of the tree.
+    pub(crate) fn rows_in_order<T: Copy>(&self, rows: &[T], width: usize) -> Vec<T> {
+        let mut found = Vec::with_capacity(rows.len());
+        self.points.iter().for_each(|&at| found.extend_from_slice(&rows[at as usize * width..][..width]));
+        found
+    }
+
     /// The same tree over the points in its order.
     pub(crate) fn in_own_order(&self) -> Self {
         Self { points: (0..self.points.len() as u32).collect(), ..self.clone() }

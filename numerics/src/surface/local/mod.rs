@@ -3,6 +3,7 @@
 pub mod coarse;
 pub(crate) mod smoothed;
 pub mod sure;
+mod tree_order;
 
 use std::sync::Arc;
 
@@ -24,10 +25,10 @@ use crate::points::cloud::Cloud;
 use crate::points::neighbourhoods::Neighbourhoods;
 use crate::points::neighbours::Neighbour;
 use crate::points::sampling::Sampling;
-use crate::points::tree_order::TreeOrder;
 use coarse::outward_directions;
 use smoothed::{Placed, Smoothed};
 use sure::least_ratio;
+use tree_order::TreeOrder;
 
 /// Cosine between a normal and the gradient of the coarse function above which the sign of the normal is
 /// known.

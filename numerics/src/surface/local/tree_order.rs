@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::cloud::Cloud;
-use super::sampling::Sampling;
 use crate::error::Result;
+use crate::points::cloud::Cloud;
+use crate::points::sampling::Sampling;
 
 /// A cloud in the order of its tree: points near each other in space mostly lie near each other in memory.
 ///
@@ -23,8 +23,8 @@ impl TreeOrder {
     /// # Errors
     /// None: points stay what they are. The type of a cloud checks them again.
     pub fn of(cloud: &Cloud, given: Arc<Sampling>) -> Result<Self> {
-        let (d, order) = (cloud.dimension(), given.neighbours().order());
-        let coordinates = rows_at(order, cloud.coordinates(), d);
+        let d = cloud.dimension();
+        let coordinates = given.neighbours().rows_in_order(cloud.coordinates(), d);
         Ok(Self {
             cloud: Arc::new(Cloud::new(coordinates, d)?),
             sampling: Arc::new(given.in_tree_order()),
@@ -34,7 +34,7 @@ impl TreeOrder {
 
     /// Rows of the given points, `[n, width]`, in this order.
     pub fn own_rows<T: Copy>(&self, given: &[T], width: usize) -> Vec<T> {
-        rows_at(self.given.neighbours().order(), given, width)
+        self.given.neighbours().rows_in_order(given, width)
     }
 
     /// Rows of the points in this order, `[n, width]`, in the given one.
@@ -50,13 +50,6 @@ impl TreeOrder {
     pub fn n_bytes(&self) -> usize {
         self.cloud.n_bytes() + self.sampling.n_bytes()
     }
-}
-
-/// Rows `[n, width]` of the points of a list, one after another.
-pub(super) fn rows_at<T: Copy>(points: &[u32], rows: &[T], width: usize) -> Vec<T> {
-    let mut found = Vec::with_capacity(rows.len());
-    points.iter().for_each(|&point| found.extend_from_slice(&rows[point as usize * width..][..width]));
-    found
 }
 
 #[cfg(test)]
