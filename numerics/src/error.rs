@@ -74,6 +74,10 @@ pub enum NumericsError {
         "the surface needs more than {limit} nodes of a lattice with this step; make it longer, or set bounds"
     )]
     TooManyNodes { limit: usize },
+    #[error(
+        "the kernel needs more than {most} landmarks for these points: it is too rough, or its length scale too short"
+    )]
+    RankTooLarge { most: usize },
     #[error("the computation was cancelled")]
     Cancelled,
 }
@@ -100,6 +104,8 @@ pub enum NotDefinite {
 pub enum SolverKind {
     /// A factorization of the whole matrix.
     Dense,
+    /// Weights at a few points, whose kernels span those of the others.
+    Landmark,
     /// Local fits to the nearest points of each query.
     Local,
 }

@@ -72,8 +72,14 @@ impl FitKey {
     /// Computes the key of the model that a recipe makes of a cloud, with duplicates merged or not.
     pub fn of(owner: Owner, cloud_id: CloudId, recipe: &Recipe, is_merged: bool) -> Self {
         let mut hasher = blake3::Hasher::new();
-        if recipe.solver() == SolverKind::Local {
-            hasher.update(b"local");
+        match recipe.solver() {
+            SolverKind::Dense => {}
+            SolverKind::Landmark => {
+                hasher.update(b"landmark");
+            }
+            SolverKind::Local => {
+                hasher.update(b"local");
+            }
         }
         if let Some((kernel, regularization)) = recipe.process() {
             hasher.update(&[u8::from(is_merged)]);

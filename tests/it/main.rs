@@ -30,6 +30,7 @@ mod idempotency;
 mod jobs;
 mod kept_jobs;
 mod keys;
+mod landmarks;
 mod learned;
 mod length_scales;
 mod level_sets;

@@ -17,6 +17,7 @@ from ..report import significant
 from ..setting import N_THREADS, Setting
 from . import growth
 from .data import Dragon, describe
+from .landmarks import Landmarks
 from .level_sets import LevelSets
 from .peers import Peers
 from .report import OURS, Entry, Measured, Work, markdown, plain
@@ -36,7 +37,11 @@ def main() -> None:
     fields = {"solver": arguments.solver} if arguments.solver else {}
     service = Service(setting, arguments.binary, fields)
     peers, dragon = Peers(setting, arguments.cached_peers), Dragon(setting.build / "scale")
-    works = {**Table(setting, service, peers, dragon).works(), **LevelSets(setting, service, peers, dragon).works()}
+    works = {
+        **Table(setting, service, peers, dragon).works(),
+        **LevelSets(setting, service, peers, dragon).works(),
+        **Landmarks(setting, service).works(),
+    }
     chosen = choose([*works, "growth"], arguments.row)
     busy = [machine.busy_cores()]
     rows = {name: measure(name, works[name](), arguments) for name in works if name in chosen}

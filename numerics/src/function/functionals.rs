@@ -4,7 +4,6 @@
 //! value at x_j is F applied to k(·, x_j). Its posterior variance is `FF'k − |L⁻¹Fk(X)|²`, as for a value
 //! (Rasmussen and Williams 2006, sec. 9.4).
 
-use faer::{ColRef, MatMut};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
@@ -208,14 +207,13 @@ pub(crate) fn deviations(
     observer: &dyn Observer,
 ) -> Result<Deviations> {
     let ScaledFit { solver, solution, factor } = fit;
-    let (n, kernel) = (solver.n_points(), solver.kernel());
+    let kernel = solver.kernel();
     solver.cloud().check_same_dimension(queries)?;
     if functionals.iter().any(JetFunctional::has_derivatives) {
         check_smooth_at(solver.cloud(), kernel, queries)?;
     }
-    let covariances = Covariant::of(solver.cloud(), kernel);
+    let covariances = Covariant::of(solver.known_points(), kernel);
     let of_mean = solution.trend.as_ref().map(|trend| MeanVariance::of(solver, trend)).transpose()?;
-    let mut buffer = vec![0.0; n * COLUMNS_AT_ONCE.min(functionals.len())];
     let (mut found, mut clamped) = (Vec::with_capacity(functionals.len()), Vec::new());
     for block in functionals.chunks(COLUMNS_AT_ONCE) {
         observer.checkpoint()?;
@@ -223,12 +221,12 @@ pub(crate) fn deviations(
         let sizes: Vec<f64> = block.iter().map(|functional| functional.size(kernel)).collect();
         let block: Vec<JetFunctional> = block.iter().zip(&sizes).map(|(of, &size)| of.over(size)).collect();
         observer.enter(Stage::Evaluate);
-        let columns = &mut buffer[..n * block.len()];
-        covariances.fill(&block, queries, columns);
+        let mut columns = vec![0.0; solver.known_points().n_points() * block.len()];
+        covariances.fill(&block, queries, &mut columns);
         observer.enter(Stage::Solve);
-        solver.whiten_in_place(MatMut::from_column_major_slice_mut(columns, n, block.len()), observer)?;
+        let whitened = solver.whitened(columns, observer)?;
         let variance = |(column, functional): (&[f64], &JetFunctional)| {
-            let explained = ColRef::from_slice(column).squared_norm_l2();
+            let explained = whitened.explained(column, column);
             let unexplained = of_mean.as_ref().map(|mean| {
                 let on_mean = functional.on_mean(mean.basis, queries.point(functional.query));
                 let h = mean.unexplained(on_mean, column);
@@ -238,7 +236,8 @@ pub(crate) fn deviations(
             // NaN propagates.
             ((if variance < 0.0 { 0.0 } else { variance }) + unexplained.unwrap_or(0.0), variance < 0.0)
         };
-        let variances = columns.par_chunks_exact(n).zip(&block).map(variance).collect::<Vec<_>>();
+        let columns = whitened.columns.par_chunks_exact(whitened.n_rows);
+        let variances = columns.zip(&block).map(variance).collect::<Vec<_>>();
         let first = found.len();
         for (at, ((variance, is_negative), size)) in variances.into_iter().zip(sizes).enumerate() {
             found.push(factor.sqrt() * variance.sqrt() * size);

@@ -9,17 +9,16 @@ use faer::{Mat, MatMut};
 use crate::error::{NumericsError, Result};
 use crate::machine::vector::dot;
 use crate::observer::Unobserved;
-use crate::solver::Solver;
 use crate::solver::trend::{Basis, Trend, solve_gram};
+use crate::solver::{Solver, Whitened};
 
 /// The mean's part in variances, factored for many functionals.
 pub(super) struct MeanVariance<'a> {
     pub(super) basis: &'a Basis,
-    /// `L⁻¹F`, `[p, n]`: one column of n numbers per function.
-    whitened: Vec<f64>,
+    /// `L⁻¹F`: one column for each function.
+    whitened: Whitened,
     /// `(FᵀWF)⁻¹`, `[p, p]`.
     inverse: Mat<f64>,
-    n_points: usize,
 }
 
 impl<'a> MeanVariance<'a> {
@@ -29,12 +28,14 @@ impl<'a> MeanVariance<'a> {
     pub(super) fn of(solver: &Solver, trend: &'a Trend) -> Result<Self> {
         let (basis, n) = (trend.basis(), solver.n_points());
         let p = basis.n_functions();
-        let mut whitened = basis.columns(solver.cloud());
+        let columns = basis.columns(solver.cloud());
         // Unobserved, since a few columns take no time.
-        solver.whiten_in_place(MatMut::from_column_major_slice_mut(&mut whitened, n, p), &Unobserved)?;
-        let gram = Mat::from_fn(p, p, |a, b| dot(&whitened[a * n..][..n], &whitened[b * n..][..n]));
+        let whitened = solver.whitened_values(columns.clone(), &Unobserved)?;
+        let mut weights = columns.clone();
+        solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, p));
+        let gram = Mat::from_fn(p, p, |a, b| dot(&columns[a * n..][..n], &weights[b * n..][..n]));
         let inverse = solve_gram(&gram, Mat::identity(p, p)).ok_or(NumericsError::MeanNotDetermined)?;
-        Ok(Self { basis, whitened, inverse, n_points: n })
+        Ok(Self { basis, whitened, inverse })
     }
 
     /// Returns h of the value at position x. `column` is `L⁻¹c`, the whitened covariances of the value.
@@ -46,8 +47,8 @@ impl<'a> MeanVariance<'a> {
 
     /// Returns h of a functional from f, its results on the mean's functions, and from `column`, `L⁻¹c`.
     pub(super) fn unexplained(&self, mut functions: Vec<f64>, column: &[f64]) -> Vec<f64> {
-        let whitened = self.whitened.chunks_exact(self.n_points);
-        functions.iter_mut().zip(whitened).for_each(|(h, o)| *h -= dot(o, column));
+        let whitened = &self.whitened;
+        functions.iter_mut().zip(whitened.iter()).for_each(|(h, o)| *h -= whitened.explained(o, column));
         functions
     }
 

@@ -4,17 +4,17 @@
 //! the uncertainty of its coefficients given the values.
 
 use faer::linalg::matmul::matmul;
-use faer::{Accum, ColRef, MatMut, MatRef};
+use faer::{Accum, MatMut, MatRef};
 use rayon::prelude::*;
 
 use super::COLUMNS_AT_ONCE;
 use super::mean_variance::MeanVariance;
-use crate::error::{NotDefinite, Result};
+use crate::error::{NotDefinite, NumericsError, Result};
 use crate::machine::parallelism::parallelism;
 use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
 use crate::solver::trend::Trend;
-use crate::solver::{Solution, Solver};
+use crate::solver::{Solution, Solver, Whitened};
 use crate::sums::gram::{fill_cross_gram, fill_lower_gram, mirror};
 use crate::sums::nodes::Nodes;
 use crate::sums::regularization::Regularization;
@@ -96,19 +96,16 @@ pub fn variances_with_mean(
     queries: &Cloud,
     observer: &dyn Observer,
 ) -> Result<Variances> {
-    let n = solver.n_points();
     solver.cloud().check_same_dimension(queries)?;
     let k0 = solver.kernel().at_zero();
-    let nodes = Nodes::of(solver.cloud());
+    let nodes = Nodes::of(solver.known_points());
     let of_mean = trend.map(|trend| MeanVariance::of(solver, trend)).transpose()?;
-    let mut buffer = vec![0.0; n * COLUMNS_AT_ONCE.min(queries.n_points())];
     let mut variances = Variances { latent: Vec::with_capacity(queries.n_points()), clamped: Vec::new() };
     for rows in queries.coordinates().chunks(COLUMNS_AT_ONCE * queries.dimension()) {
         let block = Cloud::new(rows.to_vec(), queries.dimension())?;
-        let columns = &mut buffer[..n * block.n_points()];
-        whitened_cross_gram(solver, &nodes, &block, columns, observer)?;
-        let parts = columns.par_chunks_exact(n).enumerate().map(|(query, column)| {
-            let explained = ColRef::from_slice(column).squared_norm_l2();
+        let whitened = whitened_cross_gram(solver, &nodes, &block, observer)?;
+        let parts = whitened.columns.par_chunks_exact(whitened.n_rows).enumerate().map(|(query, column)| {
+            let explained = whitened.explained(column, column);
             let of_mean = of_mean.as_ref().map(|mean| {
                 let h = mean.unexplained_at(block.point(query), column);
                 mean.product(&h, &h)
@@ -148,27 +145,26 @@ pub fn covariance_with_mean(
     queries: &Cloud,
     observer: &dyn Observer,
 ) -> Result<Covariance> {
-    let (n, m) = (solver.n_points(), queries.n_points());
+    let m = queries.n_points();
     solver.cloud().check_same_dimension(queries)?;
-    let nodes = Nodes::of(solver.cloud());
-    let mut v = vec![0.0; n * m];
-    let rows = queries.coordinates().chunks(COLUMNS_AT_ONCE * queries.dimension());
-    for (rows, columns) in rows.zip(v.chunks_mut(COLUMNS_AT_ONCE * n)) {
-        let block = Cloud::new(rows.to_vec(), queries.dimension())?;
-        whitened_cross_gram(solver, &nodes, &block, columns, observer)?;
-    }
+    let nodes = Nodes::of(solver.known_points());
+    let whitened = whitened_cross_gram(solver, &nodes, queries, observer)?;
     observer.enter(Stage::Evaluate);
     let mut covariance = vec![0.0; m * m];
     fill_lower_gram(queries, solver.kernel(), &Regularization::Uniform(0.0), &mut covariance, m, observer)?;
-    let v = MatRef::from_column_major_slice(&v, n, m);
+    let n = whitened.n_rows;
+    let v = MatRef::from_column_major_slice(&whitened.columns, n, m);
+    let (explaining, not_explaining) = v.split_at_row(whitened.n_explaining);
     let mut lower = MatMut::from_column_major_slice_mut(&mut covariance, m, m);
     for first in (0..m).step_by(COLUMNS_AT_ONCE) {
         observer.checkpoint()?;
         let width = COLUMNS_AT_ONCE.min(m - first);
-        let (rows, columns) = (v.subcols(first, m - first), v.subcols(first, width));
-        let block = lower.as_mut().submatrix_mut(first, first, m - first, width);
         let par = parallelism((2 * n * width * (m - first)) as f64);
-        matmul(block, Accum::Add, rows.transpose(), columns, -1.0, par);
+        for (v, sign) in [(explaining, -1.0), (not_explaining, 1.0)] {
+            let (rows, columns) = (v.subcols(first, m - first), v.subcols(first, width));
+            let block = lower.as_mut().submatrix_mut(first, first, m - first, width);
+            matmul(block, Accum::Add, rows.transpose(), columns, sign, par);
+        }
     }
     let mut clamped = Vec::new();
     for query in 0..m {
@@ -211,19 +207,18 @@ pub fn log_marginal_likelihood(solver: &Solver, solution: &Solution, factor: f64
     Ok(-0.5 * (solution.energy / factor + solver.log_determinant()? + normalization))
 }
 
-/// Computes `columns ← L⁻¹ k(X, Q)`, one column per query.
+/// Computes `L⁻¹ k(X, Q)`, one column per query.
 fn whitened_cross_gram(
     solver: &Solver,
     nodes: &Nodes,
     queries: &Cloud,
-    columns: &mut [f64],
     observer: &dyn Observer,
-) -> Result<()> {
+) -> Result<Whitened> {
     observer.enter(Stage::Evaluate);
-    fill_cross_gram(nodes, solver.kernel(), queries, columns, observer)?;
+    let mut columns = vec![0.0; nodes.n_points() * queries.n_points()];
+    fill_cross_gram(nodes, solver.kernel(), queries, &mut columns, observer)?;
     observer.enter(Stage::Solve);
-    let (n, m) = (solver.n_points(), queries.n_points());
-    solver.whiten_in_place(MatMut::from_column_major_slice_mut(columns, n, m), observer)
+    solver.whitened(columns, observer)
 }
 
 /// Checks that a negative variance is at least −τ(q), the tolerance of [`variances`].
@@ -235,6 +230,9 @@ fn check_is_rounding(
     variance: f64,
     observer: &dyn Observer,
 ) -> Result<()> {
+    if let Some(rounding) = solver.rounding_of_variances() {
+        return if -variance <= rounding { Ok(()) } else { Err(negative(solver, query, variance)) };
+    }
     let n = solver.n_points();
     let mut w = vec![0.0; n];
     let at_query = Cloud::new(x.to_vec(), x.len())?;
@@ -242,11 +240,11 @@ fn check_is_rounding(
     solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut w, n, 1));
     let norm_squared: f64 = w.par_iter().map(|w| w * w).sum();
     let tolerance = 4.0 * f64::EPSILON * (solver.kernel().at_zero() + solver.norm1() * norm_squared);
-    if -variance <= tolerance {
-        Ok(())
-    } else {
-        Err(solver.not_positive_definite(NotDefinite::NegativeVariance { query, variance }))
-    }
+    if -variance <= tolerance { Ok(()) } else { Err(negative(solver, query, variance)) }
+}
+
+fn negative(solver: &Solver, query: usize, variance: f64) -> NumericsError {
+    solver.not_positive_definite(NotDefinite::NegativeVariance { query, variance })
 }
 
 #[cfg(test)]

@@ -13,9 +13,14 @@ impl Random {
         Self(mixed(seed.wrapping_add(STEP)) ^ mixed(stream.wrapping_mul(STEP)))
     }
 
-    fn next(&mut self) -> u64 {
+    pub(crate) fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(STEP);
         mixed(self.0)
+    }
+
+    /// Returns an index below n, uniform up to 2⁻⁵³.
+    pub(crate) fn below(&mut self, n: usize) -> usize {
+        ((self.uniform() * n as f64) as usize).min(n.saturating_sub(1))
     }
 
     /// Returns a number uniform in [0, 1), a multiple of 2⁻⁵³.

@@ -29,20 +29,25 @@ impl Recipe {
     pub fn made_at_once(&self) -> Option<Model> {
         match self {
             Self::LocalSurface { .. } => Some(Model::LocalSurface),
-            Self::System { .. } | Self::LocalKriging { .. } => None,
+            Self::System { .. } | Self::Landmark { .. } | Self::LocalKriging { .. } => None,
         }
     }
 
     /// Makes the model ready.
     ///
     /// # Errors
-    /// Returns the errors of [`System::new`] and [`Solver::dense_in`], and `NumericsError::Cancelled`.
+    /// Returns the errors of [`System::new`], [`Solver::dense_in`] and [`Solver::landmark`], and
+    /// `NumericsError::Cancelled`.
     pub fn make(self, making: Making<'_>, observer: &dyn Observer) -> Result<Model> {
         let Making { cloud, sampling, workspace } = making;
         match self {
             Self::System { kernel, regularization } => {
                 let system = System::new(cloud, kernel, regularization)?;
                 Ok(Model::System(Arc::new(Solver::dense_in(workspace, system, observer)?)))
+            }
+            Self::Landmark { kernel, regularization } => {
+                let system = System::new(cloud, kernel, regularization)?;
+                Ok(Model::System(Arc::new(Solver::landmark(system, observer)?)))
             }
             Self::LocalKriging { kernel, regularization } => {
                 let sampling = match sampling {

@@ -22,7 +22,7 @@ use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::points::sampling::Sampling;
 use crate::solver::trend::Mean;
-use crate::solver::{Solution, Solver};
+use crate::solver::{Method, Solution, Solver};
 use crate::surface::Surface;
 use crate::surface::local::{Given, LocalSurface};
 use crate::surface::signature::{Signature, SignatureSurface};
@@ -54,19 +54,25 @@ pub struct SurfaceMaking<'a> {
 impl Model {
     pub fn solver_kind(&self) -> SolverKind {
         match self {
-            Self::System(_) => SolverKind::Dense,
+            Self::System(solver) => match solver.method() {
+                Method::Landmark => SolverKind::Landmark,
+                Method::Cholesky | Method::PivotedCholesky => SolverKind::Dense,
+            },
             Self::LocalKriging(_) | Self::LocalSurface => SolverKind::Local,
         }
     }
 
     /// Returns the label of the model in metrics.
     ///
-    /// `dense` is a factorization of the whole matrix, `pivoted` one of its pivots. `moving` is local
-    /// kriging, and `local` stands for local regressions.
+    /// `dense` is a factorization of the whole matrix, `pivoted` one of its pivots, `landmark` one of
+    /// landmarks. `moving` is local kriging, and `local` stands for local regressions.
     pub fn name(&self) -> &'static str {
         match self {
-            Self::System(solver) if solver.rank() < solver.n_points() => "pivoted",
-            Self::System(_) => "dense",
+            Self::System(solver) => match solver.method() {
+                Method::Cholesky => "dense",
+                Method::PivotedCholesky => "pivoted",
+                Method::Landmark => "landmark",
+            },
             Self::LocalKriging(_) => "moving",
             Self::LocalSurface => "local",
         }

@@ -5,6 +5,7 @@ use crate::error::SolverKind;
 use crate::function::local_kriging::price::{kriged_operator_price, kriging_price, making_price};
 use crate::function::price::{self as functions, deviations_price, judging_price, many_price, samples_price};
 use crate::machine::price::{Price, Sizes};
+use crate::solver::landmark::price::{landmark_fit_flops, landmark_price, on_landmarks};
 use crate::solver::price::FactorPrice;
 use crate::sums::price::pair_flops;
 use crate::surface::mesh::fields::quadrics::BYTES_PER_POINT;
@@ -41,6 +42,11 @@ impl Recipe {
         let CloudSize { n_points, dimension, is_merged } = size;
         match self {
             Self::System { .. } => system_price(n_points, dimension),
+            Self::Landmark { .. } => {
+                let price = landmark_price(n_points, dimension);
+                let surface = signature_surface_price(n_points, dimension);
+                MakingPrice { expected: price, at_most: price, surface }
+            }
             Self::LocalKriging { kernel, .. } => {
                 let price = making_price(n_points, dimension, is_merged, kernel.is_stretched());
                 MakingPrice { expected: price, at_most: price, surface: Price::default() }
@@ -90,6 +96,10 @@ pub fn function_price(solver: SolverKind, order: usize, n_deviations: usize, siz
     match solver {
         SolverKind::Local => kriging_price(n_deviations, sizes),
         SolverKind::Dense => functions::function_price(order, sizes).and(of_deviations(n_deviations, sizes)),
+        SolverKind::Landmark => {
+            let fit = Price::of_numbers(6 * sizes.n_points, landmark_fit_flops(sizes.n_points));
+            fit.and(function_price(SolverKind::Dense, order, n_deviations, on_landmarks(sizes)))
+        }
     }
 }
 
@@ -98,6 +108,11 @@ pub fn posterior_price(solver: SolverKind, asked: PosteriorAsked, sizes: Sizes) 
     let PosteriorAsked { has_variances, has_covariance, n_lists, n_deviations, .. } = asked;
     if solver == SolverKind::Local {
         return kriging_price(n_deviations, sizes);
+    }
+    if solver == SolverKind::Landmark {
+        let fit = landmark_fit_flops(sizes.n_points) * n_lists as f64;
+        let of_lists = Price::of_numbers(sizes.n_points.saturating_mul(6 * n_lists), fit);
+        return of_lists.and(posterior_price(SolverKind::Dense, asked, on_landmarks(sizes)));
     }
     let mut price = functions::posterior_price(has_variances, has_covariance, sizes);
     if n_lists > 1 {
@@ -124,13 +139,16 @@ pub fn geometry_price(surface: SolverKind, asked: AskedOfSurface, sizes: Sizes) 
     match surface {
         SolverKind::Local => local_geometry_price(sizes),
         SolverKind::Dense => surfaces::geometry_price(asked, sizes),
+        SolverKind::Landmark => surfaces::geometry_price(asked, on_landmarks(sizes)),
     }
 }
 
 /// The price of meshing the surface of a model, or a level of its values.
 pub fn level_set_price(solver: SolverKind, size: MeshSize) -> Price {
     match solver {
-        SolverKind::Dense => size.price(size.n_points as f64 * pair_flops(size.dimension, 0)),
+        SolverKind::Dense | SolverKind::Landmark => {
+            size.price(size.n_points as f64 * pair_flops(size.dimension, 0))
+        }
         SolverKind::Local => {
             let mesh = size.price(LOCAL_EVALUATION);
             let n_bytes = mesh.n_bytes.saturating_add(size.n_points.saturating_mul(BYTES_PER_POINT));
@@ -146,6 +164,10 @@ pub fn operator_price(values: SolverKind, surface: SolverKind, asked: OperatorAs
         SolverKind::Local => {
             let of_surface = Sizes { n_points: n_surface_points, ..sizes };
             geometry_price(surface, asked.surface, of_surface).and(kriged_operator_price(sizes))
+        }
+        SolverKind::Landmark => {
+            let fit = Price::of_numbers(6 * sizes.n_points, landmark_fit_flops(sizes.n_points));
+            fit.and(operator_price(SolverKind::Dense, surface, asked, on_landmarks(sizes)))
         }
         SolverKind::Dense => {
             let applied = applied_price(n_surface_points, asked.surface, sizes);

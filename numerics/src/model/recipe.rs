@@ -14,6 +14,8 @@ use crate::surface::local::Learning;
 pub enum Recipe {
     /// A single system over all points, factorized.
     System { kernel: Kernel, regularization: Regularization },
+    /// A single system over all points, solved on landmarks.
+    Landmark { kernel: Kernel, regularization: Regularization },
     /// A small system around each query, from its nearest points.
     LocalKriging { kernel: Kernel, regularization: Regularization },
     /// A surface by local regressions, which choose kernel and noise by themselves. They learn all over the
@@ -26,6 +28,7 @@ impl Recipe {
     pub fn of_values(solver: SolverKind, kernel: Kernel, regularization: Regularization) -> Self {
         match solver {
             SolverKind::Dense => Self::System { kernel, regularization },
+            SolverKind::Landmark => Self::Landmark { kernel, regularization },
             SolverKind::Local => Self::LocalKriging { kernel, regularization },
         }
     }
@@ -33,6 +36,7 @@ impl Recipe {
     pub fn solver(&self) -> SolverKind {
         match self {
             Self::System { .. } => SolverKind::Dense,
+            Self::Landmark { .. } => SolverKind::Landmark,
             Self::LocalKriging { .. } | Self::LocalSurface { .. } => SolverKind::Local,
         }
     }
@@ -40,9 +44,9 @@ impl Recipe {
     /// Returns kernel and regularization, or `None` where they follow from the points.
     pub fn process(&self) -> Option<(&Kernel, &Regularization)> {
         match self {
-            Self::System { kernel, regularization } | Self::LocalKriging { kernel, regularization } => {
-                Some((kernel, regularization))
-            }
+            Self::System { kernel, regularization }
+            | Self::Landmark { kernel, regularization }
+            | Self::LocalKriging { kernel, regularization } => Some((kernel, regularization)),
             Self::LocalSurface { .. } => None,
         }
     }
@@ -51,7 +55,7 @@ impl Recipe {
     pub fn learning(&self) -> Option<&Learning> {
         match self {
             Self::LocalSurface { learning } => learning.as_ref(),
-            Self::System { .. } | Self::LocalKriging { .. } => None,
+            Self::System { .. } | Self::Landmark { .. } | Self::LocalKriging { .. } => None,
         }
     }
 
@@ -70,7 +74,7 @@ impl Recipe {
             Self::System { kernel, regularization } => {
                 System::new(cloud.clone(), kernel.clone(), regularization.clone()).map(Some)
             }
-            Self::LocalKriging { .. } | Self::LocalSurface { .. } => Ok(None),
+            Self::Landmark { .. } | Self::LocalKriging { .. } | Self::LocalSurface { .. } => Ok(None),
         }
     }
 }

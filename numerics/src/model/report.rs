@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::solver::trend::Trend;
-use crate::solver::{Disagreement, Method, Solution, Solver};
+use crate::solver::{Disagreement, Method, Remaining, Solution, Solver};
 use crate::surface::Surface;
 use crate::surface::local::SurfaceHyperparameters;
 
@@ -13,6 +13,8 @@ pub struct Report {
     /// Method by which the matrix was factorized.
     pub method: Option<Method>,
     pub rank: Option<usize>,
+    /// What landmarks leave of the diagonal.
+    pub remaining: Option<Remaining>,
     pub reciprocal_condition: Option<f64>,
     pub relative_residual: Option<f64>,
     /// `Λᵀ K Λ` with the kernel of the model.
@@ -42,6 +44,7 @@ impl Report {
         Self {
             method: Some(solver.method()),
             rank: Some(solver.rank()),
+            remaining: solver.remaining_diagonal(),
             reciprocal_condition: Some(solver.reciprocal_condition()),
             relative_residual: Some(solution.relative_residual),
             native_norm_squared: Some(solution.native_norm_squared),

@@ -2,6 +2,7 @@
 
 use faer::MatMut;
 
+use super::landmark::{Landmarks, TrueResidual};
 use super::residuals::Outlier;
 use super::trend::{Mean, Trend};
 use super::{Method, Solver};
@@ -105,6 +106,9 @@ impl Solution {
     ) -> Result<(Self, Option<Jets>)> {
         solver.cloud().check_one_per_point(values)?;
         observer.enter(Stage::Solve);
+        if let Some(landmarks) = solver.landmarks() {
+            return Self::on_landmarks(solver, landmarks, values, order, observer);
+        }
         let candidate = |weights| Candidate::new(solver, values, weights, order, observer);
         let is_one = values.iter().all(|&value| value == 1.0);
         let weights = if is_one { solver.weights_of_one().to_vec() } else { solve(solver, values) };
@@ -123,6 +127,41 @@ impl Solution {
         }
         observer.solved_to(best.relative_residual(values));
         best.accept(solver, values, refined)
+    }
+
+    /// Solves on landmarks. The residual is that of the true system all the same.
+    fn on_landmarks(
+        solver: &Solver,
+        landmarks: &Landmarks,
+        values: &[f64],
+        order: Option<JetOrder>,
+        observer: &dyn Observer,
+    ) -> Result<(Self, Option<Jets>)> {
+        let fitted = landmarks.fit(values, observer)?;
+        if fitted.at_landmarks.iter().chain(&fitted.weights).any(|w| !w.is_finite()) {
+            return Err(NumericsError::WeightsOverflow);
+        }
+        let TrueResidual { relative, max } = TrueResidual::of(landmarks, values, &fitted, observer)?;
+        if relative.is_nan() || relative > MAX_RELATIVE_RESIDUAL {
+            let reason = NotDefinite::Residual { relative_residual: relative };
+            return Err(solver.not_positive_definite(reason));
+        }
+        observer.solved_to(relative);
+        let at = |order| solver.expansion(&fitted.at_landmarks).at(solver.cloud(), order, observer);
+        let jets = order.map(at).transpose()?;
+        let misfits: Vec<f64> = fitted.at_points.iter().zip(values).map(|(u, y)| u - y).collect();
+        let solution = Self {
+            misfit: norm2(&misfits),
+            weights: fitted.at_landmarks,
+            relative_residual: relative,
+            residual_max: max,
+            native_norm_squared: fitted.native_norm_squared,
+            energy: fitted.energy,
+            refined: false,
+            trend: None,
+            outlier: None,
+        };
+        Ok((solution, jets))
     }
 
     /// Bytes held on the heap.

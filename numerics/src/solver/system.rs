@@ -5,9 +5,14 @@ use std::sync::Arc;
 use crate::error::{NumericsError, Result};
 use crate::kernel::Kernel;
 use crate::machine::heap::{arc_payload, block_bytes, vec_bytes};
+use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::points::duplicates::coinciding_points;
+use crate::sums::expansion::Expansion;
 use crate::sums::regularization::Regularization;
+
+/// Columns of which [`System::largest_row_seen`] is the largest.
+const ROWS_SEEN: usize = 64;
 
 /// The linear system of a fit, `(K(X, X) + αI) Λ = Y` for any values Y. Its constructor checks that a
 /// solution can exist.
@@ -46,6 +51,22 @@ impl System {
     /// Returns the regularization α.
     pub fn regularization(&self) -> &Regularization {
         &self.regularization
+    }
+
+    /// Returns the largest sum of magnitudes of some columns of `K + αI`, spread over the points.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub(super) fn largest_row_seen(&self, observer: &dyn Observer) -> Result<f64> {
+        let n = self.n_points();
+        let some: Vec<usize> = (0..n).step_by(n.div_ceil(ROWS_SEEN)).collect();
+        let places = self.cloud.select(&some);
+        // Kernels are nowhere negative.
+        let ones = vec![1.0; n];
+        let sums = Expansion { centres: &self.cloud, kernel: &self.kernel, weights: &ones }
+            .values_at(&places, observer)?;
+        let with_noise = sums.iter().zip(&some).map(|(sum, &point)| sum + self.regularization.at(point));
+        Ok(with_noise.fold(0.0, f64::max))
     }
 
     pub fn n_points(&self) -> usize {

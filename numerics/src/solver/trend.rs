@@ -84,7 +84,7 @@ impl Basis {
         let (n, p) = (solver.n_points(), self.n_functions());
         let columns = self.columns(solver.cloud());
         let mut weights = columns.clone();
-        solver.solve_transposed_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, p));
+        solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, p));
         let gram = Mat::from_fn(p, p, |a, b| dot(&columns[a * n..][..n], &weights[b * n..][..n]));
         let solved = solve_gram(&gram, Mat::from_fn(p, n, |a, i| weights[a * n + i]))?;
         Some((0..p * n).map(|at| solved[(at / n, at % n)]).collect())

@@ -505,19 +505,24 @@ Absent for values from the local solver, which is not evaluated at the points.*/
         ///Estimated standard deviation of the noise of the points across the surface, length.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub noise_deviation: ::std::option::Option<f64>,
-        ///Numerical rank of the matrix.
+        ///Numerical rank of the matrix, or the number of landmarks.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub rank: ::std::option::Option<u64>,
         ///Number of positions around a point on which the answer there depends, with local regressions.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub reach: ::std::option::Option<u64>,
-        ///Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): roughly the fraction of digits that survive.
+        /**Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): roughly the fraction of digits that survive. For landmarks,
+that of their normal equations.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub reciprocal_condition: ::std::option::Option<f64>,
         /**‖Y − (K + αI)Λ‖/‖Y‖ of the solve, where Y is the values without their mean. For matrices and surfaces,
 Y = 1.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub relative_residual: ::std::option::Option<f64>,
+        /**Largest entry of the diagonal of K that the landmarks leave, over all points. Only with the solver
+`landmark`.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub remaining_diagonal: ::std::option::Option<f64>,
         ///The solver used.
         pub solver: SolverUsed,
         ///The reason why `auto` chose a solver other than the dense one. Absent otherwise.
@@ -526,6 +531,10 @@ Y = 1.*/
         ///Number of rows of a sparse operator by how their weights were computed.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub stencils: ::std::option::Option<StencilsUsed>,
+        /**What the landmarks were to leave of the diagonal at most: a millionth of the noise or less. Only with
+the solver `landmark`.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub tolerance: ::std::option::Option<f64>,
         ///Changes that were made, and limits of the accuracy.
         pub warnings: ::std::vec::Vec<Warning>,
     }
@@ -649,6 +658,8 @@ They are learned from what ran on this machine since the server started.*/
         BunchKaufman,
         #[serde(rename = "partial_pivoting_lu")]
         PartialPivotingLu,
+        #[serde(rename = "landmark")]
+        Landmark,
         #[serde(rename = "conjugate_gradients")]
         ConjugateGradients,
         #[serde(rename = "local")]
@@ -661,6 +672,7 @@ They are learned from what ran on this machine since the server started.*/
                 Self::PivotedCholesky => f.write_str("pivoted_cholesky"),
                 Self::BunchKaufman => f.write_str("bunch_kaufman"),
                 Self::PartialPivotingLu => f.write_str("partial_pivoting_lu"),
+                Self::Landmark => f.write_str("landmark"),
                 Self::ConjugateGradients => f.write_str("conjugate_gradients"),
                 Self::Local => f.write_str("local"),
             }
@@ -676,6 +688,7 @@ They are learned from what ran on this machine since the server started.*/
                 "pivoted_cholesky" => Ok(Self::PivotedCholesky),
                 "bunch_kaufman" => Ok(Self::BunchKaufman),
                 "partial_pivoting_lu" => Ok(Self::PartialPivotingLu),
+                "landmark" => Ok(Self::Landmark),
                 "conjugate_gradients" => Ok(Self::ConjugateGradients),
                 "local" => Ok(Self::Local),
                 _ => Err("invalid value".into()),
@@ -3080,6 +3093,8 @@ smaller one.*/
         Auto,
         #[serde(rename = "dense")]
         Dense,
+        #[serde(rename = "landmark")]
+        Landmark,
         #[serde(rename = "local")]
         Local,
     }
@@ -3088,6 +3103,7 @@ smaller one.*/
             match *self {
                 Self::Auto => f.write_str("auto"),
                 Self::Dense => f.write_str("dense"),
+                Self::Landmark => f.write_str("landmark"),
                 Self::Local => f.write_str("local"),
             }
         }
@@ -3100,6 +3116,7 @@ smaller one.*/
             match value {
                 "auto" => Ok(Self::Auto),
                 "dense" => Ok(Self::Dense),
+                "landmark" => Ok(Self::Landmark),
                 "local" => Ok(Self::Local),
                 _ => Err("invalid value".into()),
             }
@@ -3123,7 +3140,7 @@ smaller one.*/
     }
     /**The solver that was used.
 
-`landmark` and `iterative` are reserved: no answer has them yet.*/
+`iterative` is reserved: no answer has it yet.*/
     #[derive(
         ::serde::Deserialize,
         ::serde::Serialize,
@@ -5199,6 +5216,10 @@ mean. The diagnostics repeat all of it.*/
                 ::std::option::Option<f64>,
                 ::std::string::String,
             >,
+            remaining_diagonal: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
             solver: ::std::result::Result<super::SolverUsed, ::std::string::String>,
             solver_reason: ::std::result::Result<
                 ::std::option::Option<::std::string::String>,
@@ -5206,6 +5227,10 @@ mean. The diagnostics repeat all of it.*/
             >,
             stencils: ::std::result::Result<
                 ::std::option::Option<super::StencilsUsed>,
+                ::std::string::String,
+            >,
+            tolerance: ::std::result::Result<
+                ::std::option::Option<f64>,
                 ::std::string::String,
             >,
             warnings: ::std::result::Result<
@@ -5238,9 +5263,11 @@ mean. The diagnostics repeat all of it.*/
                     reach: Ok(Default::default()),
                     reciprocal_condition: Ok(Default::default()),
                     relative_residual: Ok(Default::default()),
+                    remaining_diagonal: Ok(Default::default()),
                     solver: Err("no value supplied for solver".to_string()),
                     solver_reason: Ok(Default::default()),
                     stencils: Ok(Default::default()),
+                    tolerance: Ok(Default::default()),
                     warnings: Err("no value supplied for warnings".to_string()),
                 }
             }
@@ -5480,6 +5507,20 @@ mean. The diagnostics repeat all of it.*/
                     });
                 self
             }
+            pub fn remaining_diagonal<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.remaining_diagonal = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for remaining_diagonal: {e}"
+                        )
+                    });
+                self
+            }
             pub fn solver<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<super::SolverUsed>,
@@ -5513,6 +5554,18 @@ mean. The diagnostics repeat all of it.*/
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for stencils: {e}")
+                    });
+                self
+            }
+            pub fn tolerance<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.tolerance = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for tolerance: {e}")
                     });
                 self
             }
@@ -5553,9 +5606,11 @@ mean. The diagnostics repeat all of it.*/
                     reach: value.reach?,
                     reciprocal_condition: value.reciprocal_condition?,
                     relative_residual: value.relative_residual?,
+                    remaining_diagonal: value.remaining_diagonal?,
                     solver: value.solver?,
                     solver_reason: value.solver_reason?,
                     stencils: value.stencils?,
+                    tolerance: value.tolerance?,
                     warnings: value.warnings?,
                 })
             }
@@ -5581,9 +5636,11 @@ mean. The diagnostics repeat all of it.*/
                     reach: Ok(value.reach),
                     reciprocal_condition: Ok(value.reciprocal_condition),
                     relative_residual: Ok(value.relative_residual),
+                    remaining_diagonal: Ok(value.remaining_diagonal),
                     solver: Ok(value.solver),
                     solver_reason: Ok(value.solver_reason),
                     stencils: Ok(value.stencils),
+                    tolerance: Ok(value.tolerance),
                     warnings: Ok(value.warnings),
                 }
             }

@@ -14,6 +14,9 @@ pub enum SolverChoice {
     Auto,
     /// Cholesky factorization of the full matrix: n³/3 flops, 4n² bytes.
     Dense,
+    /// Weights at a few hundred to a few thousand of the points, whose kernels span those of all others: for
+    /// smooth kernels and up to millions of points.
+    Landmark,
     /// Uses only the points nearest to each query: kriging for values, regressions for surfaces. For
     /// thousands to millions of points.
     Local,

@@ -25,6 +25,8 @@ pub enum FactorizationUsed {
     BunchKaufman,
     /// Reserved for LU with partial pivoting.
     PartialPivotingLu,
+    /// Cholesky of the normal equations of landmarks.
+    Landmark,
     /// Reserved for iterative solvers.
     ConjugateGradients,
     /// None. Small systems of the points nearest to each query are solved instead.
@@ -33,13 +35,13 @@ pub enum FactorizationUsed {
 
 /// The solver that was used.
 ///
-/// `landmark` and `iterative` are reserved: no answer has them yet.
+/// `iterative` is reserved: no answer has it yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SolverUsed {
     /// A factorization of the full matrix.
     Dense,
-    /// Reserved for a low-rank factorization.
+    /// Weights at a few of the points, whose kernels span those of all others.
     Landmark,
     /// Reserved for preconditioned conjugate gradients.
     Iterative,
@@ -51,6 +53,7 @@ impl From<SolverKind> for SolverUsed {
     fn from(kind: SolverKind) -> Self {
         match kind {
             SolverKind::Dense => Self::Dense,
+            SolverKind::Landmark => Self::Landmark,
             SolverKind::Local => Self::Local,
         }
     }
@@ -130,10 +133,19 @@ pub struct Diagnostics {
     pub solver_reason: Option<String>,
     /// The factorization of the matrix.
     pub factorization: FactorizationUsed,
-    /// Numerical rank of the matrix.
+    /// Numerical rank of the matrix, or the number of landmarks.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rank: Option<usize>,
-    /// Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): roughly the fraction of digits that survive.
+    /// Largest entry of the diagonal of K that the landmarks leave, over all points. Only with the solver
+    /// `landmark`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub remaining_diagonal: Option<f64>,
+    /// What the landmarks were to leave of the diagonal at most: a millionth of the noise or less. Only with
+    /// the solver `landmark`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<f64>,
+    /// Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): roughly the fraction of digits that survive. For landmarks,
+    /// that of their normal equations.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reciprocal_condition: Option<f64>,
     /// ‖Y − (K + αI)Λ‖/‖Y‖ of the solve, where Y is the values without their mean. For matrices and surfaces,

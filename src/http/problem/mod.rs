@@ -267,6 +267,13 @@ impl Problem {
             E::OpenSurface { .. } => at(Slug::InvalidRequest, "/open"),
             E::TooManyNodes { .. } => at(Slug::InvalidRequest, "/step"),
             E::Unsupported { .. } => at(Slug::UnsupportedBySolver, "/solver"),
+            E::RankTooLarge { .. } => {
+                let remedy = format!(
+                    "{detail}; take a smoother kernel or a longer length scale, set a larger alpha, or set \"solver\" to \
+                     \"dense\" or \"local\""
+                );
+                Self::of_field(Slug::UnsupportedBySolver, "/solver", remedy)
+            }
             E::Overflow { .. } => {
                 Self::new(Slug::InvalidRequest, format!("{detail}; scale the values or the length scale"))
             }

@@ -34,13 +34,13 @@ const FLOPS_PER_CHECKPOINT: f64 = 3e10;
 const LEAST_PIECE: usize = 128;
 
 /// The matrix `K + αI`, and after [`Cholesky::factorize`] its factor L.
-pub(super) struct Cholesky {
+pub(in crate::solver) struct Cholesky {
     packed: Packed,
 }
 
 impl Cholesky {
     /// Returns how many numbers n points take. `None` if the count overflows.
-    pub(super) fn n_numbers_needed(n: usize) -> Option<usize> {
+    pub(in crate::solver) fn n_numbers_needed(n: usize) -> Option<usize> {
         Packed::n_numbers(n)
     }
 
@@ -48,7 +48,7 @@ impl Cholesky {
     ///
     /// # Errors
     /// [`NumericsError::OutOfMemory`], [`NumericsError::Cancelled`].
-    pub(super) fn assemble(
+    pub(in crate::solver) fn assemble(
         spare: &Arc<SpareBuffer>,
         cloud: &Cloud,
         kernel: &Kernel,
@@ -62,29 +62,29 @@ impl Cholesky {
     ///
     /// # Errors
     /// [`NumericsError::OutOfMemory`].
-    pub(super) fn blank(spare: &Arc<SpareBuffer>, n: usize) -> Result<Self> {
+    pub(in crate::solver) fn blank(spare: &Arc<SpareBuffer>, n: usize) -> Result<Self> {
         Ok(Self { packed: Packed::blank(spare, n)? })
     }
 
     /// Returns all numbers in the order of memory.
-    pub(super) fn numbers(&self) -> &[f64] {
+    pub(in crate::solver) fn numbers(&self) -> &[f64] {
         self.packed.numbers()
     }
 
-    pub(super) fn numbers_mut(&mut self) -> &mut [f64] {
+    pub(in crate::solver) fn numbers_mut(&mut self) -> &mut [f64] {
         self.packed.numbers_mut()
     }
 
-    pub(super) fn n_points(&self) -> usize {
+    pub(in crate::solver) fn n_points(&self) -> usize {
         self.packed.n_points()
     }
 
-    pub(super) fn n_bytes(&self) -> usize {
+    pub(in crate::solver) fn n_bytes(&self) -> usize {
         self.packed.n_bytes()
     }
 
     /// Returns `‖A‖₁` of A before it is factorized.
-    pub(super) fn norm1(&self) -> f64 {
+    pub(in crate::solver) fn norm1(&self) -> f64 {
         self.packed.norm1()
     }
 
@@ -93,7 +93,11 @@ impl Cholesky {
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
-    pub(super) fn factorize(mut self, floor: f64, observer: &dyn Observer) -> Result<Result<Self, usize>> {
+    pub(in crate::solver) fn factorize(
+        mut self,
+        floor: f64,
+        observer: &dyn Observer,
+    ) -> Result<Result<Self, usize>> {
         match factorize_packed(&mut self.packed, floor, observer) {
             Ok(()) => Ok(Ok(self)),
             Err(Stop::NotPositive(point)) => {
@@ -106,7 +110,7 @@ impl Cholesky {
     }
 
     /// `rhs ← (LLᵀ)⁻¹ rhs`.
-    pub(super) fn solve_in_place(&self, mut rhs: MatMut<'_, f64>) {
+    pub(in crate::solver) fn solve_in_place(&self, mut rhs: MatMut<'_, f64>) {
         self.whiten_in_place(rhs.rb_mut());
         if let Some(x) = only_column(rhs.rb_mut()) {
             return solve_backward(&self.packed, x);
@@ -120,7 +124,7 @@ impl Cholesky {
     }
 
     /// `rhs ← L⁻¹ rhs`.
-    pub(super) fn whiten_in_place(&self, mut rhs: MatMut<'_, f64>) {
+    pub(in crate::solver) fn whiten_in_place(&self, mut rhs: MatMut<'_, f64>) {
         if let Some(x) = only_column(rhs.rb_mut()) {
             return solve_forward(&self.packed, x);
         }
@@ -129,7 +133,7 @@ impl Cholesky {
     }
 
     /// Computes `rhs ← L⁻¹ rhs` with a given parallelism.
-    pub(super) fn whiten_with(&self, rhs: MatMut<'_, f64>, par: Par) {
+    pub(in crate::solver) fn whiten_with(&self, rhs: MatMut<'_, f64>, par: Par) {
         let (l11, l21, l22) = self.parts();
         let (mut first, mut second) = rhs.split_at_row_mut(l11.nrows());
         solve_lower_triangular_in_place(l11, first.rb_mut(), par);
@@ -138,7 +142,7 @@ impl Cholesky {
     }
 
     /// `ln det A = 2 Σ ln L_ii`.
-    pub(super) fn log_determinant(&self) -> f64 {
+    pub(in crate::solver) fn log_determinant(&self) -> f64 {
         self.packed.diagonal().map(|pivot| 2.0 * pivot.ln()).sum()
     }
 
@@ -238,7 +242,7 @@ fn solve_below(l: MatRef<'_, f64>, mut below: MatMut<'_, f64>, observer: &dyn Ob
 
 /// Splits n rows or columns into parts of at most [`FLOPS_PER_CHECKPOINT`], but not below [`LEAST_PIECE`].
 /// Yields the first index and the length of each.
-pub(super) fn pieces(n: usize, flops_each: f64) -> impl Iterator<Item = (usize, usize)> {
+pub(in crate::solver) fn pieces(n: usize, flops_each: f64) -> impl Iterator<Item = (usize, usize)> {
     let most = ((FLOPS_PER_CHECKPOINT / flops_each) as usize).max(LEAST_PIECE);
     let length = n.div_ceil(n.div_ceil(most).max(1)).max(1);
     (0..n).step_by(length).map(move |first| (first, length.min(n - first)))

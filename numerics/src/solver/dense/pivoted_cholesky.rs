@@ -31,7 +31,7 @@ const ROWS_PER_CHECKPOINT: usize = 512;
 /// is `min |g − Y_Z|² + |Mg − Y₂|²`, with Y₂ the values at the other points. Hence `g = Y_Z + C(Y₂ − MY_Z)`,
 /// a correction of what the pivots alone say. `C = (I + MᵀM)⁻¹Mᵀ = Mᵀ(I + MMᵀ)⁻¹`, and the smaller of the two
 /// matrices is used.
-pub(super) struct PivotedCholesky {
+pub(in crate::solver) struct PivotedCholesky {
     /// Point of each row, pivots first.
     order: Vec<usize>,
     rank: usize,
@@ -41,7 +41,7 @@ pub(super) struct PivotedCholesky {
 
 impl PivotedCholesky {
     /// Returns how many numbers any rank needs. `None` if the count overflows. Each thread needs O(n) more.
-    pub(super) fn n_numbers_needed(n: usize) -> Option<usize> {
+    pub(in crate::solver) fn n_numbers_needed(n: usize) -> Option<usize> {
         n.checked_mul(n)
     }
 
@@ -51,7 +51,7 @@ impl PivotedCholesky {
     /// # Errors
     /// [`NumericsError::WeightsOverflow`] beyond the range of float64. [`NumericsError::OutOfMemory`] if it
     /// needs all and may not take it. [`NumericsError::Cancelled`].
-    pub(super) fn factorize(
+    pub(in crate::solver) fn factorize(
         cloud: &Cloud,
         kernel: &Kernel,
         regularization: &Regularization,
@@ -113,17 +113,17 @@ impl PivotedCholesky {
     }
 
     /// Returns the points that have weights, `[r]`.
-    pub(super) fn pivots(&self) -> &[usize] {
+    pub(in crate::solver) fn pivots(&self) -> &[usize] {
         &self.order[..self.rank]
     }
 
-    pub(super) fn n_bytes(&self) -> usize {
+    pub(in crate::solver) fn n_bytes(&self) -> usize {
         vec_bytes(&self.buffer) + vec_bytes(&self.order)
     }
 
     /// Overwrites values with weights, column by column: `Λ_Z = (L₁₁L₁₁ᵀ)⁻¹ (Y_Z + C(Y₂ − MY_Z))`, zero
     /// elsewhere.
-    pub(super) fn solve_in_place(&self, mut values: MatMut<'_, f64>) {
+    pub(in crate::solver) fn solve_in_place(&self, mut values: MatMut<'_, f64>) {
         let (mut at_pivots, mut elsewhere) = self.split_rows(values.as_ref());
         let par = self.parallelism(values.ncols());
         matmul(elsewhere.as_mut(), Accum::Add, self.m(), at_pivots.as_ref(), -1.0, par);
@@ -136,7 +136,7 @@ impl PivotedCholesky {
 
     /// Applies the transpose of [`Self::solve_in_place`]. With `p = (L₁₁L₁₁ᵀ)⁻¹ f_Z` and `t = Cᵀp`, the
     /// result is `p − Mᵀt` at the pivots and t elsewhere.
-    pub(super) fn solve_transposed_in_place(&self, mut functionals: MatMut<'_, f64>) {
+    pub(in crate::solver) fn solve_transposed_in_place(&self, mut functionals: MatMut<'_, f64>) {
         let (mut at_pivots, _) = self.split_rows(functionals.as_ref());
         let par = self.parallelism(functionals.ncols());
         self.solve_at_pivots(at_pivots.as_mut());

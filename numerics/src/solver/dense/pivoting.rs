@@ -37,7 +37,7 @@ const WORTH: f64 = 0.1;
 ///
 /// The cost is n r kernel values and `n r² − ⅔r³` flops in matrix products. Besides the n r numbers of L,
 /// each thread needs O(n) memory.
-pub(super) struct Pivoting<'a> {
+pub(in crate::solver) struct Pivoting<'a> {
     cloud: &'a Cloud,
     kernel: &'a Kernel,
     regularization: &'a Regularization,
@@ -49,20 +49,43 @@ pub(super) struct Pivoting<'a> {
     /// L column by column, n numbers each. Entries above its diagonal are zero.
     columns: &'a mut [f64],
     rank: usize,
+    tolerance: Tolerance,
+}
+
+/// Largest diagonal entry that may remain.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::solver) struct Tolerance {
+    /// What counts as rounding, whatever the rank.
+    pub(in crate::solver) rounding: f64,
+    /// What may remain for each pivot.
+    pub(in crate::solver) per_pivot: f64,
+    /// What may remain at most, unless it is rounding.
+    pub(in crate::solver) most: f64,
+}
+
+impl Tolerance {
+    /// Only rounding may remain.
+    pub(in crate::solver) fn rounding(kernel: &Kernel) -> Self {
+        Self { rounding: PIVOT_TOLERANCE * kernel.at_zero(), per_pivot: 0.0, most: 0.0 }
+    }
+
+    pub(in crate::solver) fn at(&self, rank: usize) -> f64 {
+        self.rounding.max((self.per_pivot * rank as f64).min(self.most))
+    }
 }
 
 /// The outcome of pivoting. The columns of L are in the buffer.
-pub(super) struct Pivots {
+pub(in crate::solver) struct Pivots {
     /// Point of each row, pivots first.
-    pub(super) order: Vec<usize>,
+    pub(in crate::solver) order: Vec<usize>,
     /// Number of pivots.
-    pub(super) rank: usize,
+    pub(in crate::solver) rank: usize,
     /// True if what remains is rounding, false if the pivots did not fit.
-    pub(super) is_complete: bool,
+    pub(in crate::solver) is_complete: bool,
 }
 
 impl<'a> Pivoting<'a> {
-    pub(super) fn new(
+    pub(in crate::solver) fn new(
         cloud: &'a Cloud,
         kernel: &'a Kernel,
         regularization: &'a Regularization,
@@ -71,19 +94,25 @@ impl<'a> Pivoting<'a> {
         let n = cloud.n_points();
         let remaining = (0..n).map(|point| kernel.at_zero() + regularization.at(point)).collect();
         let order = (0..n).collect();
-        Self { cloud, kernel, regularization, nodes: Nodes::of(cloud), order, remaining, columns, rank: 0 }
+        let (nodes, tolerance) = (Nodes::of(cloud), Tolerance::rounding(kernel));
+        Self { cloud, kernel, regularization, nodes, order, remaining, columns, rank: 0, tolerance }
     }
 
-    /// Adds pivots until the largest remaining diagonal entry is rounding, or until more than `max_rank`
+    /// Ends where as much remains as is tolerated.
+    pub(in crate::solver) fn to(self, tolerance: Tolerance) -> Self {
+        Self { tolerance, ..self }
+    }
+
+    /// Adds pivots until the largest remaining diagonal entry is tolerated, or until more than `max_rank`
     /// would be needed.
     ///
     /// # Errors
     /// `NumericsError::Cancelled`.
-    pub(super) fn run(mut self, max_rank: usize, observer: &dyn Observer) -> Result<Pivots> {
+    pub(in crate::solver) fn run(mut self, max_rank: usize, observer: &dyn Observer) -> Result<Pivots> {
         let is_complete = loop {
             observer.checkpoint()?;
             let largest = self.remaining[self.rank..].iter().copied().fold(0.0, f64::max);
-            let tolerance = PIVOT_TOLERANCE * self.kernel.at_zero();
+            let tolerance = self.tolerance.at(self.rank);
             if largest <= tolerance {
                 break true;
             }

@@ -48,8 +48,9 @@ class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
         Mean of the function, beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the features. If
         absent, a constant where `kernel` is absent too, else zero.
     solver : str, optional
-        `"dense"`; `"local"` to predict from the nearest samples; or `"auto"` (if absent): dense up to the
-        largest size that the service factorizes, local beyond.
+        `"dense"`; `"landmark"` for smooth kernels on many samples; `"local"` to predict from the nearest
+        samples; or `"auto"` (if absent): dense up to the largest size that the service factorizes, local
+        beyond.
     duplicates : str, optional
         Policy for samples at the same place when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
     client : Client or str, optional

@@ -35,9 +35,12 @@ impl Fitted {
             factorization: match report.method {
                 Some(Method::Cholesky) => FactorizationUsed::Cholesky,
                 Some(Method::PivotedCholesky) => FactorizationUsed::PivotedCholesky,
+                Some(Method::Landmark) => FactorizationUsed::Landmark,
                 None => FactorizationUsed::Local,
             },
             rank: report.rank,
+            remaining_diagonal: report.remaining.map(|remaining| remaining.largest * scale),
+            tolerance: report.remaining.map(|remaining| remaining.tolerance * scale),
             reciprocal_condition: report.reciprocal_condition,
             relative_residual: report.relative_residual,
             native_norm_squared: report.native_norm_squared.map(|norm| norm / scale),
@@ -85,7 +88,10 @@ impl Fitted {
                 "Cholesky fails in float64; solved by least squares on {rank} of {n} points, which span the others to rounding"
             );
             warn(WarningCode::IllConditioned, detail);
-        } else if reciprocal_condition < ILL_CONDITIONED && !plan.process.is_learned {
+        } else if report.remaining.is_none()
+            && reciprocal_condition < ILL_CONDITIONED
+            && !plan.process.is_learned
+        {
             // Where the values decided, float64 sets the least noise. The weights follow it on purpose.
             let detail = format!("the reciprocal condition is {reciprocal_condition:.1e}");
             warn(WarningCode::IllConditioned, detail);

@@ -20,7 +20,12 @@ pub struct PlannedSurface {
 /// Definition of a surface.
 pub enum SurfaceSource {
     /// A level of a signature function.
-    Signature { kernel: Option<PlannedKernel>, regularization: Option<Regularization>, purpose: Purpose },
+    Signature {
+        solver: SolverKind,
+        kernel: Option<PlannedKernel>,
+        regularization: Option<Regularization>,
+        purpose: Purpose,
+    },
     /// Local regressions. They learn all over the cloud, unless `learning` says otherwise. `reason` is set
     /// where `auto` chose them.
     Regressions { reason: Option<AutoLocal>, learning: Option<Learning> },
@@ -29,7 +34,7 @@ pub enum SurfaceSource {
 impl PlannedSurface {
     pub fn solver(&self) -> SolverKind {
         match self.choice {
-            SurfaceSource::Signature { .. } => SolverKind::Dense,
+            SurfaceSource::Signature { solver, .. } => solver,
             SurfaceSource::Regressions { .. } => SolverKind::Local,
         }
     }
@@ -47,8 +52,10 @@ impl PlannedSurface {
     pub(super) fn resolve(self) -> Result<FitPlan, Problem> {
         let Self { on, choice } = self;
         let refuse = |error| Problem::from_numerics(error, on.pointers);
-        let (kernel, regularization, purpose) = match choice {
-            SurfaceSource::Signature { kernel, regularization, purpose } => (kernel, regularization, purpose),
+        let (solver, kernel, regularization, purpose) = match choice {
+            SurfaceSource::Signature { solver, kernel, regularization, purpose } => {
+                (solver, kernel, regularization, purpose)
+            }
             SurfaceSource::Regressions { reason, learning } => {
                 return FitPlan::of(on, Recipe::LocalSurface { learning }, reason, Process::default());
             }
@@ -66,7 +73,7 @@ impl PlannedSurface {
             }
         };
         let ScaledProcess { kernel, regularization, scale } = scaled;
-        let recipe = Recipe::of_values(SolverKind::Dense, kernel, regularization);
+        let recipe = Recipe::of_values(solver, kernel, regularization);
         FitPlan::of(on, recipe, None, Process { scale, ..Process::default() })
     }
 }

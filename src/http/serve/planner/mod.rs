@@ -118,10 +118,13 @@ impl<'a> Planner<'a> {
             }
             Regressed::No if let Some((member, _)) = learning => return Err(only_local_learns(member)),
             Regressed::No => {
-                self.check_max_dense_points(&on)?;
+                let solver = of_whole(options.solver);
+                if solver == SolverKind::Dense {
+                    self.check_max_dense_points(&on)?;
+                }
                 let kernel = options.kernel.as_ref().map(|kernel| kernel.plan(on.pointers)).transpose()?;
                 let regularization = options.regularization(&on)?;
-                SurfaceSource::Signature { kernel, regularization, purpose }
+                SurfaceSource::Signature { solver, kernel, regularization, purpose }
             }
         };
         Ok(PlannedSurface { on, choice })
@@ -226,6 +229,7 @@ impl<'a> Planner<'a> {
             SolverChoice::Auto if stored.cloud.n_points() > self.app.config.max_dense_points => {
                 ValuesSolver { kind: SolverKind::Local, reason: Some(AutoLocal::BeyondDense) }
             }
+            SolverChoice::Landmark => ValuesSolver::asked(SolverKind::Landmark),
             SolverChoice::Auto | SolverChoice::Dense => ValuesSolver::asked(SolverKind::Dense),
         }
     }
@@ -247,7 +251,7 @@ impl<'a> Planner<'a> {
             return Err(local_lacks_operators("/solver"));
         }
         let on = self.fitted_cloud(&mut fit)?;
-        let (solver, options) = (ValuesSolver::asked(SolverKind::Dense), FitOptions::of(fit));
+        let (solver, options) = (ValuesSolver::asked(of_whole(fit.solver)), FitOptions::of(fit));
         let under = self.surface_under(&on, options.clone(), geometry)?;
         let main = self.plan_values(on, options, solver, Mean::Zero)?;
         Ok((main, self.plan_surface_under(under, request)?))
@@ -388,6 +392,14 @@ pub struct OperatorFits {
     pub main: PlannedValues,
     pub values: Arc<Values>,
     pub surface: PlannedSurface,
+}
+
+/// Returns the solver of one system over all points that a choice stands for.
+fn of_whole(choice: SolverChoice) -> SolverKind {
+    match choice {
+        SolverChoice::Landmark => SolverKind::Landmark,
+        SolverChoice::Auto | SolverChoice::Dense | SolverChoice::Local => SolverKind::Dense,
+    }
 }
 
 /// Decision for or against local regressions of a surface.

@@ -33,7 +33,7 @@ class Diagnostics:
             answer.
         solver (SolverUsed): The solver that was used.
 
-            `landmark` and `iterative` are reserved: no answer has them yet.
+            `iterative` is reserved: no answer has it yet.
         factorization (FactorizationUsed): The factorization of the Gram matrix.
 
             `bunch_kaufman`, `partial_pivoting_lu` and `conjugate_gradients` are reserved: no answer has them yet.
@@ -41,9 +41,16 @@ class Diagnostics:
         warnings (list[Warning_]): Changes that were made, and limits of the accuracy.
         alpha (float | Unset): The number added to the diagonal. Absent with `noise_variances`.
         solver_reason (str | Unset): The reason why `auto` chose a solver other than the dense one. Absent otherwise.
-        rank (int | Unset): Numerical rank of the matrix.
+        rank (int | Unset): Numerical rank of the matrix, or the number of landmarks.
+        remaining_diagonal (float | Unset): Largest entry of the diagonal of K that the landmarks leave, over all
+            points. Only with the solver
+            `landmark`.
+        tolerance (float | Unset): What the landmarks were to leave of the diagonal at most: a millionth of the noise or
+            less. Only with
+            the solver `landmark`.
         reciprocal_condition (float | Unset): Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): roughly the fraction of digits
-            that survive.
+            that survive. For landmarks,
+            that of their normal equations.
         relative_residual (float | Unset): ‖Y − (K + αI)Λ‖/‖Y‖ of the solve, where Y is the values without their mean.
             For matrices and surfaces,
             Y = 1.
@@ -77,6 +84,8 @@ class Diagnostics:
     alpha: float | Unset = UNSET
     solver_reason: str | Unset = UNSET
     rank: int | Unset = UNSET
+    remaining_diagonal: float | Unset = UNSET
+    tolerance: float | Unset = UNSET
     reciprocal_condition: float | Unset = UNSET
     relative_residual: float | Unset = UNSET
     native_norm_squared: float | Unset = UNSET
@@ -118,6 +127,10 @@ class Diagnostics:
         solver_reason = self.solver_reason
 
         rank = self.rank
+
+        remaining_diagonal = self.remaining_diagonal
+
+        tolerance = self.tolerance
 
         reciprocal_condition = self.reciprocal_condition
 
@@ -168,6 +181,10 @@ class Diagnostics:
             field_dict["solver_reason"] = solver_reason
         if rank is not UNSET:
             field_dict["rank"] = rank
+        if remaining_diagonal is not UNSET:
+            field_dict["remaining_diagonal"] = remaining_diagonal
+        if tolerance is not UNSET:
+            field_dict["tolerance"] = tolerance
         if reciprocal_condition is not UNSET:
             field_dict["reciprocal_condition"] = reciprocal_condition
         if relative_residual is not UNSET:
@@ -228,6 +245,10 @@ class Diagnostics:
 
         rank = d.pop("rank", UNSET)
 
+        remaining_diagonal = d.pop("remaining_diagonal", UNSET)
+
+        tolerance = d.pop("tolerance", UNSET)
+
         reciprocal_condition = d.pop("reciprocal_condition", UNSET)
 
         relative_residual = d.pop("relative_residual", UNSET)
@@ -276,6 +297,8 @@ class Diagnostics:
             alpha=alpha,
             solver_reason=solver_reason,
             rank=rank,
+            remaining_diagonal=remaining_diagonal,
+            tolerance=tolerance,
             reciprocal_condition=reciprocal_condition,
             relative_residual=relative_residual,
             native_norm_squared=native_norm_squared,

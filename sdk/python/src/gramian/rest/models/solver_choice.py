@@ -4,6 +4,7 @@ from enum import StrEnum
 class SolverChoice(StrEnum):
     AUTO = "auto"
     DENSE = "dense"
+    LANDMARK = "landmark"
     LOCAL = "local"
 
     def __str__(self) -> str:

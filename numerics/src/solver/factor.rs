@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::cholesky::Cholesky;
-use super::{Factorization, Solver};
+use super::dense::Cholesky;
+use super::factorized::{Factorization, Solver};
 use crate::error::Result;
 use crate::machine::pages::SpareBuffer;
 use crate::solver::system::System;
@@ -72,7 +72,7 @@ impl Solver {
                 norm1: self.norm1,
                 reciprocal_condition: self.reciprocal_condition,
             }),
-            Factorization::PivotedCholesky { .. } => None,
+            Factorization::PivotedCholesky { .. } | Factorization::Landmark(_) => None,
         }
     }
 }

@@ -1,0 +1,142 @@
+"""Rows of the solver `landmark`: one function through all points, beside the dense solver where that runs."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..clouds import Floats
+from ..setting import Setting
+from .data import torus
+from .report import OURS, Bound, Entry, Figure, Work
+from .service import Answered, Service
+from .table import costs, entry, notes
+
+GAUSS = {"family": "gauss", "length_scale": 1.0}
+#: Noise variance of the values, and that of surfaces, which are exact.
+ALPHA = 1e-4
+SURFACE_ALPHA = 1e-10
+N_ROUNDS = 5
+
+
+@dataclass(frozen=True)
+class Landmarks:
+    """The tools with which the rows are measured."""
+
+    setting: Setting
+    service: Service
+
+    def works(self) -> dict[str, Callable[[], Work]]:
+        """Returns the rows by name."""
+        return {
+            "landmark-small": self.small,
+            "landmark-dense": self.beside_dense,
+            "landmark-torus": lambda: self.surface(100_000, costs(8, 0.5)),
+            "landmark-torus-million": lambda: self.surface(1_000_000, costs(60, 1)),
+            "landmark-posterior": self.posterior,
+        }
+
+    def small(self) -> Work:
+        """A posterior of 2,000 points by at most 350 landmarks."""
+        kernel, request = {**GAUSS, "length_scale": 1.75}, {"include": ["variance"], "alpha": 1e-2}
+
+        def ours() -> Entry:
+            n, m = self.setting.size(2_000, 500), self.setting.size(1_000, 100)
+            found, dense = (self._posterior(n, m, {**request, "kernel": kernel, "solver": s}, N_ROUNDS) for s in ("landmark", "dense"))
+            ratio = {"over dense": Figure(found.seconds / dense.seconds)}
+            return entry(OURS, found, {**off(found, dense), **ratio}, notes_of(found))
+
+        what = "posterior mean and variance, Gauss ℓ = 1.75, α = 0.01, torus, n = 2,000, m = 1,000"
+        return Work(what, (*accurate(1e-9, 1e-5), Bound("rank", "≤", 350)), {}, ours, nobody)
+
+    def beside_dense(self) -> Work:
+        request = {"kernel": GAUSS, "alpha": ALPHA}
+
+        def ours() -> Entry:
+            n = self.setting.size(20_000, 2_000)
+            found, dense = (self._values(n, {**request, "solver": solver}) for solver in ("landmark", "dense"))
+            faster = {"times faster": Figure(dense.seconds / found.seconds)}
+            return entry(OURS, found, {**off(found, dense), **faster}, notes_of(found))
+
+        bounds = (Bound("times faster", "≥", 15), *accurate(1e-9)[:1], Bound("residual", "≤", 1e-10))
+        return Work("mean, Gauss ℓ = 1, α = 1e-4, torus, n = 20,000, m = 10,000, beside the dense one", bounds, {}, ours, nobody)
+
+    def surface(self, n_points: int, cost: tuple[Bound, ...]) -> Work:
+        n = self.setting.size(n_points, 2_000)
+        request = {"kernel": GAUSS, "alpha": SURFACE_ALPHA, "solver": "landmark", "surface": "signature"}
+
+        def ours() -> Entry:
+            cloud = torus(n)
+            work = self.service.ask("/v1/curvatures", cloud.points, request)
+            found = np.sort(work.arrays["principal_curvatures"], axis=1)
+            exact = np.sort(cloud.curvatures, axis=1)
+            worst = np.abs(found - exact).max() / np.abs(exact).max()
+            return entry(OURS, work, {"curvatures": Figure(float(worst)), **said(work)}, notes_of(work))
+
+        what = f"normals and curvatures, Gauss ℓ = 1, α = 1e-10, torus (2, 1/2), n = m = {n:,}"
+        return Work(what, (*cost, Bound("curvatures", "≤", 5e-9)), {}, ours, nobody)
+
+    def posterior(self) -> Work:
+        n, m = self.setting.size(1_000_000, 4_000), self.setting.size(10_000, 500)
+        request = {"kernel": GAUSS, "alpha": ALPHA, "include": ["variance"], "solver": "landmark"}
+
+        def ours() -> Entry:
+            few = self.setting.size(4_000, 1_000)
+            found, dense = (self._posterior(few, 1_000, {**request, "solver": s}) for s in ("landmark", "dense"))
+            work = self._posterior(n, m, request)
+            error = {"rms error": Figure(float(np.sqrt(np.mean((work.arrays["means"].ravel() - wave(queries(m))) ** 2))))}
+            return entry(OURS, work, {**off(found, dense), **error, **said(work)}, f"the first two at n = {few:,}; {notes_of(work)}")
+
+        what = f"posterior mean and variance, Gauss ℓ = 1, α = 1e-4, torus, n = {n:,}, m = {m:,}"
+        return Work(what, (*costs(45, 1.5), *accurate(1e-6, 1e-6)), {}, ours, nobody)
+
+    def _posterior(self, n: int, m: int, request: Mapping[str, Any], n_rounds: int = 1) -> Answered:
+        points = torus(n).points
+        return self.service.ask("/v1/posterior", points, request, {"values": noisy(points), "queries": queries(m)}, n_rounds)
+
+    def _values(self, n: int, request: Mapping[str, Any]) -> Answered:
+        points, m = torus(n).points, self.setting.size(10_000, 500)
+        return self.service.ask("/v1/interpolation", points, request, {"values": noisy(points), "queries": queries(m)})
+
+
+def nobody() -> Iterable[Entry]:
+    """No peer is measured."""
+    return ()
+
+
+def accurate(mean: float, variance: float = np.inf) -> tuple[Bound, Bound]:
+    return Bound("means", "≤", mean), Bound("variances", "≤", variance)
+
+
+def queries(m: int) -> Floats:
+    return torus(m, seed=1).points
+
+
+def wave(points: Floats) -> Floats:
+    return np.sin(2 * points[:, 0]) + points[:, 1] * points[:, 2]
+
+
+def noisy(points: Floats) -> Floats:
+    return wave(points) + np.sqrt(ALPHA) * np.random.default_rng(2).standard_normal(len(points))
+
+
+def off(found: Answered, expected: Answered) -> dict[str, Figure]:
+    """Largest differences: of means over the largest mean, of variances relative."""
+    name = "means" if "means" in expected.arrays else "values"
+    mean = np.abs(found.arrays[name] - expected.arrays[name]).max() / np.abs(expected.arrays[name]).max()
+    figures = {"means": Figure(float(mean)), **said(found)}
+    if "variances" in expected.arrays:
+        figures["variances"] = Figure(float(np.abs(found.arrays["variances"] / expected.arrays["variances"] - 1).max()))
+    return figures
+
+
+def said(work: Answered) -> dict[str, Figure]:
+    """What the answer says of itself."""
+    diagnostics = work.members["diagnostics"]
+    return {"residual": Figure(diagnostics["relative_residual"]), "rank": Figure(diagnostics["rank"])}
+
+
+def notes_of(work: Answered) -> str:
+    diagnostics = work.members["diagnostics"]
+    return f"{notes(work)}; {diagnostics['remaining_diagonal']:.1e} remain, {diagnostics['tolerance']:.1e} may"

@@ -1,0 +1,408 @@
+//! A system with its factorization, whichever it is.
+
+use std::sync::Arc;
+
+use faer::prelude::ReborrowMut;
+use faer::{Mat, MatMut, Par};
+
+use super::MAX_INVERSE_DIAGONAL;
+use super::condition::estimate_norm1;
+use super::dense::{Cholesky, PivotedCholesky, pieces};
+use super::landmark::Landmarks;
+use super::solution::MAX_RELATIVE_RESIDUAL;
+use super::system::System;
+use crate::error::{NotDefinite, NumericsError, Quantity, Result, SolverKind};
+use crate::machine::heap::{arc_payload, block_bytes, vec_bytes};
+use crate::machine::pages::SpareBuffer;
+use crate::machine::vector::dot;
+use crate::observer::{Observer, Stage};
+use crate::points::cloud::Cloud;
+
+/// Method by which `K + αI` was factorized.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// `K + αI = LLᵀ`, in place.
+    Cholesky,
+    /// Rank-revealing pivoted Cholesky and least squares on the pivots, for matrices on which Cholesky fails
+    /// in float64.
+    PivotedCholesky,
+    /// Normal equations on landmarks.
+    Landmark,
+}
+
+/// Source of the memory of a factorization.
+pub struct Workspace<'a> {
+    /// Memory of an earlier factorization, if one was given back. The new factorization gives its own back
+    /// when it is dropped.
+    pub spare: &'a Arc<SpareBuffer>,
+    /// Permission to take more than half of the matrix. The argument is the number of bytes that the
+    /// factorization then takes in all.
+    pub may_take: &'a mut dyn FnMut(usize) -> bool,
+}
+
+/// Multiple of k₀ up to which a Cholesky pivot counts as rounding. Such a pivot is positive by luck, and the
+/// weights behind it are noise that the residual hardly shows.
+///
+/// The limit is below `minimum_alpha`, which is at least 16 ε k₀ and enters a pivot twice where two points
+/// coincide.
+pub(crate) const SMALLEST_PIVOT: f64 = 16.0 * f64::EPSILON;
+
+/// A system prepared for solving: a factorization of the whole matrix `K(X, X) + αI`, or landmarks.
+///
+/// It keeps the system, so that it cannot be used with another one.
+pub struct Solver {
+    pub(super) system: System,
+    pub(super) factorization: Factorization,
+    pub(super) norm1: f64,
+    pub(super) reciprocal_condition: f64,
+    /// Weights of the constant 1, `[n]`.
+    pub(super) weights_of_one: Vec<f64>,
+}
+
+pub(super) enum Factorization {
+    Cholesky(Cholesky),
+    PivotedCholesky { factor: PivotedCholesky, failed_at: usize, pivots: Arc<Cloud> },
+    Landmark(Box<Landmarks>),
+}
+
+impl Solver {
+    /// Returns how many numbers Cholesky needs at its peak: half of the matrix. `None` if that overflows.
+    pub(super) fn n_numbers_needed(n_points: usize) -> Option<usize> {
+        Cholesky::n_numbers_needed(n_points)
+    }
+
+    /// Returns how many numbers are needed at most. The fallback needs all of the matrix if its rank is above
+    /// n/4. By then Cholesky has failed and given its own back. `None` if the count overflows.
+    pub(super) fn n_numbers_needed_at_most(n_points: usize) -> Option<usize> {
+        Some(PivotedCholesky::n_numbers_needed(n_points)?.max(Self::n_numbers_needed(n_points)?))
+    }
+
+    /// Assembles and factorizes `K(X, X) + αI` exactly as given: no jitter is ever added.
+    ///
+    /// Cholesky works in place. If a pivot is rounding, the fallback is pivoted Cholesky to 64 ε k₀ and least
+    /// squares on the pivots.
+    ///
+    /// # Errors
+    /// [`NumericsError::OutOfMemory`], also if it needs more than it may take. [`NumericsError::Cancelled`].
+    pub fn dense_in(workspace: Workspace<'_>, system: System, observer: &dyn Observer) -> Result<Self> {
+        let (cloud, kernel, regularization) = (system.cloud(), system.kernel(), system.regularization());
+        observer.enter(Stage::Gram);
+        let gram = Cholesky::assemble(workspace.spare, cloud, kernel, regularization, observer)?;
+        let norm1 = gram.norm1();
+        observer.enter(Stage::Factor);
+        let factorization = match gram.factorize(SMALLEST_PIVOT * kernel.at_zero(), observer)? {
+            Ok(factor) => Factorization::Cholesky(factor),
+            Err(failed_at) => {
+                let n_numbers = Self::n_numbers_needed_at_most(cloud.n_points()).unwrap_or(usize::MAX);
+                let may_take_all = || (workspace.may_take)(n_numbers.saturating_mul(size_of::<f64>()));
+                let factor =
+                    PivotedCholesky::factorize(cloud, kernel, regularization, may_take_all, observer)?;
+                let pivots = Arc::new(cloud.select(factor.pivots()));
+                Factorization::PivotedCholesky { factor, failed_at, pivots }
+            }
+        };
+        observer.enter(Stage::Condition);
+        let (inverse_norm1, weights_of_one) = estimate_norm1(
+            cloud.n_points(),
+            |x| factorization.solve_in_place(x),
+            |x| factorization.solve_transposed_in_place(x),
+        );
+        let product = norm1 * inverse_norm1;
+        let reciprocal_condition = if product.is_finite() { 1.0 / product.max(1.0) } else { 0.0 };
+        Ok(Self { system, factorization, norm1, reciprocal_condition, weights_of_one })
+    }
+
+    /// Solves on landmarks: few points, whose kernels span those of all others up to a millionth of the
+    /// noise.
+    ///
+    /// It takes 3 n r² flops and O(r² + n) memory for r landmarks, and passes of 2 n r² flops for values.
+    ///
+    /// # Errors
+    /// [`NumericsError::RankTooLarge`] if the kernel needs too many. [`NumericsError::WeightsOverflow`],
+    /// [`NumericsError::Cancelled`].
+    pub fn landmark(system: System, observer: &dyn Observer) -> Result<Self> {
+        let (landmarks, weights_of_one) = Landmarks::of(&system, observer)?;
+        observer.enter(Stage::Condition);
+        let norm1 = system.largest_row_seen(observer)?;
+        let reciprocal_condition = landmarks.reciprocal_condition();
+        let factorization = Factorization::Landmark(Box::new(landmarks));
+        Ok(Self { system, factorization, norm1, reciprocal_condition, weights_of_one })
+    }
+
+    pub fn system(&self) -> &System {
+        &self.system
+    }
+
+    /// Method by which the matrix was factorized.
+    pub fn method(&self) -> Method {
+        match self.factorization {
+            Factorization::Cholesky(_) => Method::Cholesky,
+            Factorization::PivotedCholesky { .. } => Method::PivotedCholesky,
+            Factorization::Landmark(_) => Method::Landmark,
+        }
+    }
+
+    /// Numerical rank: n, or the number of pivots of the fallback, or of landmarks.
+    pub fn rank(&self) -> usize {
+        match &self.factorization {
+            Factorization::Cholesky(_) => self.system.n_points(),
+            Factorization::PivotedCholesky { factor, .. } => factor.pivots().len(),
+            Factorization::Landmark(landmarks) => landmarks.rank(),
+        }
+    }
+
+    /// `1/(‖K + αI‖₁ ‖W‖₁)` where W maps values to weights, estimated (Higham 2002, alg. 15.1). For
+    /// landmarks, that of their normal equations.
+    pub fn reciprocal_condition(&self) -> f64 {
+        self.reciprocal_condition
+    }
+
+    /// `W·1`, `[n]`: the weights of the signature function.
+    pub(super) fn weights_of_one(&self) -> &[f64] {
+        &self.weights_of_one
+    }
+
+    /// `‖K + αI‖₁`; for landmarks, the largest of some columns.
+    pub(crate) fn norm1(&self) -> f64 {
+        self.norm1
+    }
+
+    /// Returns the points with weights, and their indices in X if these are not all points.
+    pub(super) fn centres(&self) -> (&Cloud, Option<&[usize]>) {
+        match &self.factorization {
+            Factorization::Cholesky(_) => (self.system.cloud(), None),
+            Factorization::PivotedCholesky { factor, pivots, .. } => (pivots, Some(factor.pivots())),
+            Factorization::Landmark(landmarks) => (landmarks.cloud(), Some(landmarks.points())),
+        }
+    }
+
+    /// Bytes held on the heap, including those of the cloud.
+    pub fn n_bytes(&self) -> usize {
+        let factor = match &self.factorization {
+            Factorization::Cholesky(factor) => factor.n_bytes(),
+            Factorization::PivotedCholesky { factor, pivots, .. } => {
+                factor.n_bytes() + block_bytes(arc_payload::<Cloud>()) + pivots.n_bytes()
+            }
+            Factorization::Landmark(landmarks) => landmarks.n_bytes(),
+        };
+        factor + vec_bytes(&self.weights_of_one) + self.system.n_bytes()
+    }
+
+    /// Overwrites the columns of `[n, k]` values by weights at all points, `Λ = W Y`.
+    pub(crate) fn solve_in_place(&self, values: MatMut<'_, f64>) {
+        self.factorization.solve_in_place(values);
+    }
+
+    /// Overwrites the columns of `[n, k]` by `Wᵀ` times them.
+    ///
+    /// This turns functionals of the weights into functionals of the values, so that operators become
+    /// matrices.
+    pub(crate) fn solve_transposed_in_place(&self, functionals: MatMut<'_, f64>) {
+        self.factorization.solve_transposed_in_place(functionals);
+    }
+
+    /// The points whose covariances with a functional say what the values know of it.
+    pub(crate) fn known_points(&self) -> &Cloud {
+        match &self.factorization {
+            Factorization::Landmark(landmarks) => landmarks.cloud(),
+            Factorization::Cholesky(_) | Factorization::PivotedCholesky { .. } => self.system.cloud(),
+        }
+    }
+
+    /// Whitens covariances with the [`Solver::known_points`], one column for each functional: `L⁻¹` times
+    /// them, `LLᵀ = K + αI`, or what stands for it. [`Whitened::explained`] is then the covariance that the
+    /// values explain.
+    ///
+    /// # Errors
+    /// [`NumericsError::NotPositiveDefinite`] where the matrix has no such factor in float64;
+    /// [`NumericsError::Cancelled`].
+    pub(crate) fn whitened(&self, covariances: Vec<f64>, observer: &dyn Observer) -> Result<Whitened> {
+        if let Factorization::Landmark(landmarks) = &self.factorization {
+            let (n_rows, n_explaining) = (2 * landmarks.rank(), landmarks.rank());
+            return Ok(Whitened { columns: landmarks.whitened(&covariances), n_rows, n_explaining });
+        }
+        let n = self.system.n_points();
+        let mut columns = covariances;
+        let count = columns.len() / n;
+        self.whiten_in_place(MatMut::from_column_major_slice_mut(&mut columns, n, count), observer)?;
+        Ok(Whitened { columns, n_rows: n, n_explaining: n })
+    }
+
+    /// Whitens values `[n, k]` in the same way, such that [`Whitened::explained`] of them and covariances is
+    /// what their fit predicts.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Solver::whitened`].
+    pub(crate) fn whitened_values(&self, values: Vec<f64>, observer: &dyn Observer) -> Result<Whitened> {
+        match &self.factorization {
+            Factorization::Landmark(landmarks) => {
+                let (n_rows, n_explaining) = (2 * landmarks.rank(), landmarks.rank());
+                let columns = landmarks.whitened_values(&values, observer)?;
+                Ok(Whitened { columns, n_rows, n_explaining })
+            }
+            Factorization::Cholesky(_) | Factorization::PivotedCholesky { .. } => {
+                self.whitened(values, observer)
+            }
+        }
+    }
+
+    /// Magnitude of a negative variance up to which it is rounding, if that does not depend on the query.
+    pub(crate) fn rounding_of_variances(&self) -> Option<f64> {
+        match &self.factorization {
+            Factorization::Landmark(landmarks) => Some(landmarks.remaining().max(landmarks.tolerance())),
+            Factorization::Cholesky(_) | Factorization::PivotedCholesky { .. } => None,
+        }
+    }
+
+    /// The landmarks, if the system is solved on them.
+    pub(super) fn landmarks(&self) -> Option<&Landmarks> {
+        match &self.factorization {
+            Factorization::Landmark(landmarks) => Some(landmarks),
+            Factorization::Cholesky(_) | Factorization::PivotedCholesky { .. } => None,
+        }
+    }
+
+    /// What remains of the diagonal beside landmarks, and what was to remain at most, V².
+    pub fn remaining_diagonal(&self) -> Option<Remaining> {
+        let of = |landmarks: &Landmarks| Remaining {
+            largest: landmarks.remaining(),
+            tolerance: landmarks.tolerance(),
+        };
+        self.landmarks().map(of)
+    }
+
+    /// Overwrites the columns of `[n, k]` by `L⁻¹` times them, `LLᵀ = K + αI`.
+    ///
+    /// # Errors
+    /// [`NumericsError::NotPositiveDefinite`] where the matrix has no such factor in float64;
+    /// [`NumericsError::Cancelled`].
+    pub(crate) fn whiten_in_place(
+        &self,
+        mut columns: MatMut<'_, f64>,
+        observer: &dyn Observer,
+    ) -> Result<()> {
+        let (n, cholesky) = (self.system.n_points(), self.cholesky()?);
+        for (first, count) in pieces(columns.ncols(), (n * n) as f64) {
+            observer.checkpoint()?;
+            cholesky.whiten_in_place(columns.rb_mut().subcols_mut(first, count));
+        }
+        Ok(())
+    }
+
+    /// The diagonal of `(K + αI)⁻¹`, `[n]`.
+    ///
+    /// # Errors
+    /// Returns [`NumericsError::Unsupported`] for more than [`MAX_INVERSE_DIAGONAL`] points, and the errors
+    /// of [`Solver::whiten_in_place`].
+    pub(crate) fn inverse_diagonal(&self) -> Result<Vec<f64>> {
+        let n = self.system.n_points();
+        if n > MAX_INVERSE_DIAGONAL {
+            let solver = SolverKind::Dense;
+            return Err(NumericsError::Unsupported { solver, quantity: Quantity::InverseDiagonal });
+        }
+        let mut inverse = Mat::<f64>::identity(n, n);
+        // On one thread: the caller is one of many tasks, and a thread that waits would begin another task of
+        // that kind.
+        self.cholesky()?.whiten_with(inverse.as_mut(), Par::Seq);
+        Ok((0..n).map(|i| inverse.col(i).squared_norm_l2()).collect())
+    }
+
+    /// `ln det(K + αI)`.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Solver::whiten_in_place`].
+    pub(crate) fn log_determinant(&self) -> Result<f64> {
+        match &self.factorization {
+            Factorization::Landmark(landmarks) => Ok(landmarks.log_determinant()),
+            Factorization::Cholesky(_) | Factorization::PivotedCholesky { .. } => {
+                Ok(self.cholesky()?.log_determinant())
+            }
+        }
+    }
+
+    /// Returns the Cholesky factor, unless the matrix is singular to rounding. A factor of such a matrix
+    /// exists by luck. It still solves smooth right-hand sides, but its variances and determinants are off by
+    /// tens of percent.
+    fn cholesky(&self) -> Result<&Cholesky> {
+        match &self.factorization {
+            Factorization::Cholesky(_) if self.reciprocal_condition < f64::EPSILON => {
+                let reciprocal_condition = self.reciprocal_condition;
+                Err(self.not_positive_definite(NotDefinite::Singular { reciprocal_condition }))
+            }
+            Factorization::Cholesky(factor) => Ok(factor),
+            Factorization::PivotedCholesky { failed_at, .. } => {
+                Err(self.not_positive_definite(NotDefinite::NeedsCholesky { point: *failed_at }))
+            }
+            Factorization::Landmark(_) => {
+                let (solver, quantity) = (SolverKind::Landmark, Quantity::InverseDiagonal);
+                Err(NumericsError::Unsupported { solver, quantity })
+            }
+        }
+    }
+
+    /// Returns the refusal with its remedy: an α that is large enough.
+    pub(crate) fn not_positive_definite(&self, reason: NotDefinite) -> NumericsError {
+        let multiple = match reason {
+            NotDefinite::Residual { .. } => (self.system.n_points() as f64).max(1.0 / MAX_RELATIVE_RESIDUAL),
+            NotDefinite::BackwardError { .. }
+            | NotDefinite::NeedsCholesky { .. }
+            | NotDefinite::Unfactorable
+            | NotDefinite::Singular { .. }
+            | NotDefinite::NegativeVariance { .. } => self.system.n_points() as f64,
+        };
+        NumericsError::NotPositiveDefinite {
+            reason,
+            minimum_alpha: 4.0 * multiple * f64::EPSILON * self.norm1,
+        }
+    }
+}
+
+/// What landmarks leave of the diagonal of the kernel's matrix, V².
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Remaining {
+    /// Largest entry over all points.
+    pub largest: f64,
+    /// What was to remain at most.
+    pub tolerance: f64,
+}
+
+/// Whitened columns.
+///
+/// The first rows of a column count as explained, the others as not: the products of the latter are
+/// subtracted.
+pub(crate) struct Whitened {
+    pub(crate) columns: Vec<f64>,
+    pub(crate) n_rows: usize,
+    pub(crate) n_explaining: usize,
+}
+
+impl Whitened {
+    /// The columns, one for each functional.
+    pub(crate) fn iter(&self) -> std::slice::ChunksExact<'_, f64> {
+        self.columns.chunks_exact(self.n_rows)
+    }
+
+    /// The covariance of two functionals that the values explain, from their columns.
+    pub(crate) fn explained(&self, a: &[f64], b: &[f64]) -> f64 {
+        let (n, own) = (self.n_explaining, |x: &[f64], y: &[f64]| dot(x, y));
+        own(&a[..n], &b[..n]) - own(&a[n..], &b[n..])
+    }
+}
+
+impl Factorization {
+    fn solve_in_place(&self, values: MatMut<'_, f64>) {
+        match self {
+            Self::Cholesky(factor) => factor.solve_in_place(values),
+            Self::PivotedCholesky { factor, .. } => factor.solve_in_place(values),
+            Self::Landmark(landmarks) => landmarks.solve_in_place(values),
+        }
+    }
+
+    fn solve_transposed_in_place(&self, functionals: MatMut<'_, f64>) {
+        match self {
+            Self::Cholesky(factor) => factor.solve_in_place(functionals),
+            Self::PivotedCholesky { factor, .. } => factor.solve_transposed_in_place(functionals),
+            Self::Landmark(landmarks) => landmarks.solve_transposed_in_place(functionals),
+        }
+    }
+}

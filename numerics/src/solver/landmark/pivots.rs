@@ -1,0 +1,106 @@
+//! Choice of the landmarks.
+
+use faer::{Mat, MatRef};
+
+use super::Weighing;
+use super::rows::Rows;
+use crate::error::{NumericsError, Result};
+use crate::machine::random::Random;
+use crate::observer::Observer;
+use crate::solver::dense::{PIVOT_TOLERANCE, Pivoting, Tolerance};
+use crate::solver::system::System;
+use crate::sums::regularization::Regularization;
+
+/// Points among which landmarks are chosen.
+pub(super) const SAMPLE: usize = 10_000;
+
+/// Most landmarks, over the number of points among which they are chosen. With more, their matrix is no
+/// smaller task than that of all points.
+const MOST: f64 = 0.25;
+
+/// Least number of landmarks that is allowed, for clouds of few points.
+const LEAST_MOST: usize = 1_000;
+
+/// Seed of the sample.
+const SEED: u64 = 33;
+
+/// Part of the smallest noise that may remain of the diagonal, where there are as many landmarks as points.
+/// The largest relative error of a variance is about `τ/α · n/r`.
+const PART_OF_NOISE: f64 = 1e-6;
+
+/// Largest share of landmarks among the points at which that part still falls with them.
+const LARGEST_SHARE: f64 = 1e-2;
+
+/// Landmarks with what may remain of the diagonal.
+pub(super) struct Chosen {
+    pub rows: Rows,
+    /// τ, V².
+    pub tolerance: f64,
+}
+
+impl Chosen {
+    /// Chooses among a sample of the points.
+    ///
+    /// # Errors
+    /// [`NumericsError::RankTooLarge`], [`NumericsError::Cancelled`].
+    pub(super) fn among_sample(system: &System, observer: &dyn Observer) -> Result<Self> {
+        let n = system.n_points();
+        let mut points: Vec<usize> = (0..n).collect();
+        if n > SAMPLE {
+            let keys: Vec<u64> = (0..n).map(|point| Random::of(SEED, point as u64).next()).collect();
+            points.select_nth_unstable_by_key(SAMPLE, |&point| (keys[point], point));
+            points.truncate(SAMPLE);
+            points.sort_unstable();
+        }
+        Self::among(system, points, observer)
+    }
+
+    /// Chooses again, among the landmarks and points at which too much remains.
+    ///
+    /// # Errors
+    /// [`NumericsError::RankTooLarge`], [`NumericsError::Cancelled`].
+    pub(super) fn completed(
+        &self,
+        system: &System,
+        beyond: &[usize],
+        observer: &dyn Observer,
+    ) -> Result<Self> {
+        let mut points = self.rows.points().to_vec();
+        points.extend(beyond.iter().take(SAMPLE));
+        points.sort_unstable();
+        points.dedup();
+        Self::among(system, points, observer)
+    }
+
+    fn among(system: &System, points: Vec<usize>, observer: &dyn Observer) -> Result<Self> {
+        let (kernel, sample, n) = (system.kernel(), system.cloud().select(&points), points.len());
+        let most = ((MOST * n as f64) as usize).max(LEAST_MOST).min(n);
+        let tolerance = tolerance(system);
+        let mut columns = vec![0.0; n * most];
+        let exact = Regularization::Uniform(0.0);
+        let pivots =
+            Pivoting::new(&sample, kernel, &exact, &mut columns).to(tolerance).run(most, observer)?;
+        if !pivots.is_complete {
+            return Err(NumericsError::RankTooLarge { most });
+        }
+        let (rank, l) = (pivots.rank, MatRef::from_column_major_slice(&columns, n, most));
+        let l11 = Mat::from_fn(rank, rank, |i, j| if i < j { 0.0 } else { l[(i, j)] });
+        let chosen: Vec<usize> = pivots.order[..rank].iter().map(|&at| points[at]).collect();
+        let cloud = system.cloud().select(&chosen);
+        let coordinates = Weighing::of(system).coordinates(system);
+        Ok(Self { rows: Rows::of(chosen, cloud, l11, coordinates), tolerance: tolerance.at(rank) })
+    }
+}
+
+/// τ as a function of the number of landmarks r: `max(64 ε k₀, 1e-6 α min(r/n, 1e-2))`.
+fn tolerance(system: &System) -> Tolerance {
+    let (n, noise) = (system.n_points(), system.regularization());
+    let positive = (0..n).map(|point| noise.at(point)).filter(|alpha| *alpha > 0.0);
+    let smallest = positive.fold(f64::INFINITY, f64::min);
+    let part = if smallest.is_finite() { PART_OF_NOISE * smallest } else { 0.0 };
+    Tolerance {
+        rounding: PIVOT_TOLERANCE * system.kernel().at_zero(),
+        per_pivot: part / n as f64,
+        most: part * LARGEST_SHARE,
+    }
+}

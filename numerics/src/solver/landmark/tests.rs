@@ -1,0 +1,107 @@
+use std::sync::Arc;
+
+use crate::error::NumericsError;
+use crate::function::interpolant::Interpolant;
+use crate::function::posterior::variances;
+use crate::kernel::{Family, Kernel};
+use crate::observer::Unobserved;
+use crate::points::cloud::Cloud;
+use crate::solver::{Solver, System};
+use crate::sums::jets::JetOrder;
+use crate::sums::regularization::Regularization;
+use crate::testing::{Random, fibonacci_sphere};
+
+fn system(cloud: &Cloud, family: Family, noise: Regularization) -> System {
+    System::new(Arc::new(cloud.clone()), Kernel::new(family, 0.8, 1.7).unwrap(), noise).unwrap()
+}
+
+/// Differences from the dense solver: of means, over the largest, and of variances, relative.
+struct Off {
+    means: f64,
+    variances: f64,
+    residual: f64,
+}
+
+/// Compares both solvers at places beside the points.
+fn off(cloud: &Cloud, noise: &Regularization) -> Off {
+    let values: Vec<f64> = cloud.points().map(|x| (2.0 * x[0]).sin() + x[1] * x[2]).collect();
+    let places: Vec<f64> = fibonacci_sphere(40).coordinates().iter().map(|x| 0.97 * x).collect();
+    let places = Cloud::new(places, 3).unwrap();
+    let system = || system(cloud, Family::Gauss, noise.clone());
+    let answers =
+        [Solver::dense(system(), &Unobserved), Solver::landmark(system(), &Unobserved)].map(|solver| {
+            let solver = Arc::new(solver.unwrap());
+            let fitted = Interpolant::fit(solver.clone(), &values, &Unobserved).unwrap();
+            let means = fitted.at(&places, JetOrder::Value, &Unobserved).unwrap().values();
+            let latent = variances(&solver, &places, &Unobserved).map(|found| found.latent);
+            (means, latent, fitted.solution.relative_residual)
+        });
+    let [(expected, expected_latent, _), (found, latent, residual)] = answers;
+    let largest = expected.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
+    let worst = |of: &dyn Fn(usize) -> f64| (0..places.n_points()).map(of).fold(0.0, f64::max);
+    let means = worst(&|i| (found[i] - expected[i]).abs() / largest);
+    let variances = match (expected_latent, latent) {
+        (Ok(expected), Ok(found)) => worst(&|i| (found[i] / expected[i] - 1.0).abs()),
+        // Without noise the matrix is singular to rounding, and the dense solver has no variances.
+        (_, latent) => worst(&|i| -latent.as_ref().map_or(f64::INFINITY, |latent| latent[i])),
+    };
+    Off { means, variances, residual }
+}
+
+/// Checks what numerics promise: means to 1e-8, variances to 1e-5 and a residual of 1e-8.
+fn check(context: &str, cloud: &Cloud, noise: &Regularization) {
+    let Off { means, variances, residual } = off(cloud, noise);
+    assert!(means < 1e-8 && variances < 1e-5 && residual < 1e-8, "{context}: {means} {variances} {residual}");
+}
+
+#[test]
+fn answers_are_those_of_the_dense_solver_whatever_the_noise() {
+    let cloud = fibonacci_sphere(1500);
+    for alpha in [1.0, 1e-2, 1e-4, 1e-6] {
+        check(&format!("{alpha}"), &cloud, &Regularization::Uniform(alpha));
+    }
+    // Noise of each point its own, over four decades.
+    let noise = (0..1500).map(|i| 10f64.powi(-(i % 5) - 1)).collect();
+    check("many", &cloud, &Regularization::PerPoint(noise));
+}
+
+#[test]
+fn exact_values_are_interpolated() {
+    // The condition is beyond float64, so both solvers agree to what is left.
+    let Off { means, residual, .. } = off(&fibonacci_sphere(1500), &Regularization::Uniform(1e-12));
+    assert!(means < 1e-6 && residual < 1e-8, "{means} {residual}");
+}
+
+#[test]
+fn clusters_and_far_points_have_landmarks_of_their_own() {
+    let mut random = Random(33);
+    // 1 % of the points at 100 times the density, ten far points, and repeated ones.
+    let mut coordinates = fibonacci_sphere(1500).coordinates().to_vec();
+    for _ in 0..15 {
+        coordinates.extend([0.6, 0.8, 0.0].map(|x| x + 0.002 * random.normal()));
+    }
+    coordinates.extend((0..10).flat_map(|i| [5.0 + f64::from(i), 0.0, 9.0]));
+    coordinates.extend_from_within(..30);
+    check("clustered", &Cloud::new(coordinates, 3).unwrap(), &Regularization::Uniform(1e-3));
+}
+
+#[test]
+fn large_clouds_are_completed_beyond_their_sample() {
+    // 12,000 points, of which the sample leaves out a sixth, and ten far ones that it may not see.
+    let mut coordinates = fibonacci_sphere(12_000).coordinates().to_vec();
+    coordinates.extend((0..10).flat_map(|i| [5.0 + 3.0 * f64::from(i), 0.0, 9.0]));
+    let cloud = Cloud::new(coordinates, 3).unwrap();
+    let solver =
+        Solver::landmark(system(&cloud, Family::Gauss, Regularization::Uniform(1e-2)), &Unobserved).unwrap();
+    let remaining = solver.remaining_diagonal().unwrap();
+    assert!(remaining.largest <= 4.0 * remaining.tolerance, "{remaining:?}");
+    assert!(remaining.tolerance <= 1e-10 && solver.rank() < 1000, "{}", solver.rank());
+}
+
+#[test]
+fn rough_kernels_are_refused() {
+    let cloud = fibonacci_sphere(3000);
+    let system = system(&cloud, Family::Laplace { epsilon: 0.0 }, Regularization::Uniform(1e-6));
+    let refused = Solver::landmark(system, &Unobserved).map(|solver| solver.rank());
+    assert_eq!(refused, Err(NumericsError::RankTooLarge { most: 1000 }));
+}
