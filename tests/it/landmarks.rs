@@ -1,4 +1,4 @@
-//! The solver `landmark` over HTTP: the same answers as the dense one, what it says of itself, and its refusal.
+//! The solver `landmark` over HTTP: the answers of the dense one, what it says of itself, and its refusal.
 
 use serde_json::{Value, json};
 

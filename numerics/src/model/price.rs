@@ -44,7 +44,7 @@ impl Recipe {
             Self::System { .. } => system_price(n_points, dimension),
             Self::Landmark { .. } => {
                 let price = landmark_price(n_points, dimension);
-                let surface = signature_surface_price(n_points, dimension);
+                let surface = landmark_surface_price(n_points, dimension);
                 MakingPrice { expected: price, at_most: price, surface }
             }
             Self::LocalKriging { kernel, .. } => {
@@ -65,6 +65,15 @@ impl Recipe {
 pub fn system_price(n_points: usize, dimension: usize) -> MakingPrice {
     let FactorPrice { expected, at_most } = FactorPrice::of(n_points, dimension);
     MakingPrice { expected, at_most, surface: signature_surface_price(n_points, dimension) }
+}
+
+/// The price of a surface by the signature function of landmarks: its fit, its sums at the points, and a
+/// search and a quadric at each.
+fn landmark_surface_price(n_points: usize, dimension: usize) -> Price {
+    let of_all = signature_surface_price(n_points, dimension);
+    let centres = on_landmarks(Sizes { n_points, n_queries: 0, dimension }).n_points;
+    let fewer = n_points as f64 * (n_points - centres) as f64 * pair_flops(dimension, 2);
+    Price { flops: of_all.flops - fewer + landmark_fit_flops(n_points), ..of_all }
 }
 
 /// Request for a posterior of k lists of values.

@@ -1,5 +1,6 @@
 //! A system with its factorization, whichever it is.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use faer::prelude::ReborrowMut;
@@ -55,7 +56,7 @@ pub struct Solver {
     pub(super) factorization: Factorization,
     pub(super) norm1: f64,
     pub(super) reciprocal_condition: f64,
-    /// Weights of the constant 1, `[n]`.
+    /// Weights of the constant 1, `[n]`. Empty for landmarks.
     pub(super) weights_of_one: Vec<f64>,
 }
 
@@ -121,12 +122,12 @@ impl Solver {
     /// [`NumericsError::RankTooLarge`] if the kernel needs too many. [`NumericsError::WeightsOverflow`],
     /// [`NumericsError::Cancelled`].
     pub fn landmark(system: System, observer: &dyn Observer) -> Result<Self> {
-        let (landmarks, weights_of_one) = Landmarks::of(&system, observer)?;
+        let landmarks = Landmarks::of(&system, observer)?;
         observer.enter(Stage::Condition);
         let norm1 = system.largest_row_seen(observer)?;
         let reciprocal_condition = landmarks.reciprocal_condition();
         let factorization = Factorization::Landmark(Box::new(landmarks));
-        Ok(Self { system, factorization, norm1, reciprocal_condition, weights_of_one })
+        Ok(Self { system, factorization, norm1, reciprocal_condition, weights_of_one: Vec::new() })
     }
 
     pub fn system(&self) -> &System {
@@ -157,9 +158,15 @@ impl Solver {
         self.reciprocal_condition
     }
 
-    /// `W·1`, `[n]`: the weights of the signature function.
-    pub(super) fn weights_of_one(&self) -> &[f64] {
-        &self.weights_of_one
+    /// `W·1`, `[n]`: the weights of the signature function. Landmarks find them when they are needed.
+    pub(super) fn weights_of_one(&self) -> Cow<'_, [f64]> {
+        if !self.weights_of_one.is_empty() {
+            return Cow::Borrowed(&self.weights_of_one);
+        }
+        let n = self.system.n_points();
+        let mut weights = vec![1.0; n];
+        self.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, 1));
+        Cow::Owned(weights)
     }
 
     /// `‖K + αI‖₁`; for landmarks, the largest of some columns.

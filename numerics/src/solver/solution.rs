@@ -111,7 +111,7 @@ impl Solution {
         }
         let candidate = |weights| Candidate::new(solver, values, weights, order, observer);
         let is_one = values.iter().all(|&value| value == 1.0);
-        let weights = if is_one { solver.weights_of_one().to_vec() } else { solve(solver, values) };
+        let weights = if is_one { solver.weights_of_one().into_owned() } else { solve(solver, values) };
         let mut best = candidate(weights)?;
         let mut refined = false;
         if best.wants_refinement(solver, values) {

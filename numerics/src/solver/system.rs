@@ -53,6 +53,20 @@ impl System {
         &self.regularization
     }
 
+    /// The system of some of the points.
+    ///
+    /// # Errors
+    /// None: what holds of all points holds of some.
+    pub(super) fn at(&self, points: &[usize]) -> Result<Self> {
+        let regularization = match &self.regularization {
+            Regularization::Uniform(alpha) => Regularization::Uniform(*alpha),
+            Regularization::PerPoint(noise) => {
+                Regularization::PerPoint(points.iter().map(|&point| noise[point]).collect())
+            }
+        };
+        Self::new(Arc::new(self.cloud.select(points)), self.kernel.clone(), regularization)
+    }
+
     /// Returns the largest sum of magnitudes of some columns of `K + αI`, spread over the points.
     ///
     /// # Errors

@@ -181,7 +181,7 @@ impl Trend {
         let (cloud, n) = (solver.cloud(), solver.n_points());
         let basis = Basis::of(mean, cloud);
         let columns = basis.columns(cloud);
-        let mut weights = solver.weights_of_one().to_vec();
+        let mut weights = solver.weights_of_one().into_owned();
         weights.extend_from_slice(&columns[n..]);
         let p = basis.n_functions();
         solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights[n..], n, p - 1));

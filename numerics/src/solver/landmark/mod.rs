@@ -62,6 +62,8 @@ pub(super) struct Weighing {
     scale: f64,
     /// `W = s / d`, `[n]`.
     weights: Vec<f64>,
+    /// True if all weights are 1.
+    is_uniform: bool,
 }
 
 /// A system solved on its landmarks.
@@ -92,16 +94,20 @@ pub(super) struct Fitted {
 }
 
 impl Landmarks {
-    /// Chooses landmarks and factorizes their normal equations. Also returns the weights of the constant 1,
-    /// `[n]`.
+    /// Chooses landmarks and factorizes their normal equations.
     ///
     /// # Errors
     /// [`crate::error::NumericsError::RankTooLarge`] if the kernel needs too many.
     /// [`crate::error::NumericsError::Cancelled`].
-    pub(super) fn of(system: &System, observer: &dyn Observer) -> Result<(Self, Vec<f64>)> {
+    pub(super) fn of(system: &System, observer: &dyn Observer) -> Result<Self> {
         observer.enter(Stage::Gram);
         let weighing = Weighing::of(system);
         let mut chosen = Chosen::among_sample(system, observer)?;
+        // A look at a few points beforehand saves most of the passes over all that would be in vain.
+        let beyond = chosen.beyond_at_some(system, observer)?;
+        if !beyond.is_empty() {
+            chosen = chosen.completed(system, &beyond, observer)?;
+        }
         observer.enter(Stage::Factor);
         let mut normal = NormalEquations::of(system, &chosen, &weighing, observer)?;
         for _ in 0..ROUNDS {
@@ -111,7 +117,7 @@ impl Landmarks {
             chosen = chosen.completed(system, &normal.beyond, observer)?;
             normal = NormalEquations::of(system, &chosen, &weighing, observer)?;
         }
-        let NormalEquations { inner, right_of_one, remaining, .. } = normal;
+        let NormalEquations { inner, remaining, .. } = normal;
         let of_kernel = chosen.rows.coordinates() == Coordinates::AtLandmarks;
         let Chosen { rows, tolerance } = chosen;
         let noise = |point: usize| (weighing.scale / weighing.weights[point]).ln();
@@ -122,12 +128,7 @@ impl Landmarks {
         let of_prior = if of_kernel { of_factor(rows.l11()) } else { 0.0 };
         let log_determinant = log_noise + of_prior + of_factor(&inner) - rank * weighing.scale.ln();
         let system = system.clone();
-        let found = Self { system, rows, inner, weighing, tolerance, remaining, log_determinant };
-        let mut of_one = right_of_one;
-        found.solve_inner(MatMut::from_column_major_slice_mut(&mut of_one, found.rank(), 1));
-        let at_points = found.at_points(&of_one, 1, observer)?;
-        let weights = found.weights(&vec![1.0; at_points.len()], &at_points);
-        Ok((found, weights))
+        Ok(Self { system, rows, inner, weighing, tolerance, remaining, log_determinant })
     }
 
     pub(super) fn rank(&self) -> usize {
@@ -330,7 +331,7 @@ impl Landmarks {
 
     /// `D⁻¹(Y − u)`.
     fn weights(&self, values: &[f64], at_points: &[f64]) -> Vec<f64> {
-        let Weighing { scale, weights } = &self.weighing;
+        let Weighing { scale, weights, .. } = &self.weighing;
         let rest = values.iter().zip(at_points).zip(weights);
         rest.map(|((y, u), w)| (y - u) * w / scale).collect()
     }
@@ -367,7 +368,9 @@ impl Weighing {
         let floor = if smallest.is_finite() { LEAST_NOISE * smallest } else { rounding }.max(rounding);
         let of_point = |point: usize| noise.at(point).max(floor);
         let scale = (0..n).map(of_point).fold(f64::INFINITY, f64::min);
-        Self { scale, weights: (0..n).map(|point| scale / of_point(point)).collect() }
+        let weights: Vec<f64> = (0..n).map(|point| scale / of_point(point)).collect();
+        let is_uniform = weights.iter().all(|weight| *weight == 1.0);
+        Self { scale, weights, is_uniform }
     }
 
     /// Whitened unknowns have normal equations with the condition `n k₀ / s`, and are taken while that leaves

@@ -1,7 +1,7 @@
 //! The normal equations of the values at the landmarks.
 
 use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::{Accum, Mat};
+use faer::{Accum, Mat, MatRef};
 
 use super::Weighing;
 use super::pivots::Chosen;
@@ -19,8 +19,6 @@ const BEYOND: f64 = 4.0;
 pub(super) struct NormalEquations {
     /// L_B, lower: the factor of `FᵀWF + sI` or `MᵀWM + sK_ZZ⁻¹`.
     pub inner: Mat<f64>,
-    /// `FᵀW 1` or `MᵀW 1`, `[r]`.
-    pub right_of_one: Vec<f64>,
     /// Largest entry that remains of the diagonal.
     pub remaining: f64,
     /// Points where too much remains, those of the largest entries first.
@@ -41,14 +39,17 @@ impl NormalEquations {
     ) -> Result<Self> {
         let (rows, rank) = (&chosen.rows, chosen.rows.n_landmarks());
         let mut inner = Mat::<f64>::zeros(rank, rank);
-        let (mut right_of_one, mut remaining) = (vec![0.0; rank], 0.0_f64);
+        let mut remaining = 0.0_f64;
         let mut beyond: Vec<(f64, usize)> = Vec::new();
         rows.for_each_block(system, observer, |points, block| {
-            let weights = &weighing.weights[points.clone()];
-            let rooted = Mat::from_fn(rank, points.len(), |i, j| weights[j].sqrt() * block.rows[(i, j)]);
-            add_products(&mut inner, &rooted);
+            if weighing.is_uniform {
+                add_products(&mut inner, block.rows);
+            } else {
+                let roots: Vec<f64> = weighing.weights[points.clone()].iter().map(|w| w.sqrt()).collect();
+                let rooted = Mat::from_fn(rank, points.len(), |i, j| roots[j] * block.rows[(i, j)]);
+                add_products(&mut inner, rooted.as_ref());
+            }
             for (j, point) in points.enumerate() {
-                (0..rank).for_each(|i| right_of_one[i] += weights[j] * block.rows[(i, j)]);
                 remaining = remaining.max(block.remaining[j]);
                 if block.remaining[j] > BEYOND * chosen.tolerance {
                     beyond.push((block.remaining[j], point));
@@ -63,27 +64,22 @@ impl NormalEquations {
                 rows.whiten(inverse.as_mut());
                 // K_ZZ⁻¹ = L₁₁⁻ᵀL₁₁⁻¹
                 let scaled = Mat::from_fn(rank, rank, |i, j| weighing.scale.sqrt() * inverse[(j, i)]);
-                add_products(&mut inner, &scaled);
+                add_products(&mut inner, scaled.as_ref());
             }
         }
         factorize_in_place(inner.as_mut(), 0.0, observer)?.map_err(|_| NumericsError::WeightsOverflow)?;
-        Ok(Self {
-            inner,
-            right_of_one,
-            remaining,
-            beyond: beyond.into_iter().map(|(_, point)| point).collect(),
-        })
+        Ok(Self { inner, remaining, beyond: beyond.into_iter().map(|(_, point)| point).collect() })
     }
 }
 
 /// Adds `AAᵀ` to the lower triangle.
-fn add_products(lower: &mut Mat<f64>, a: &Mat<f64>) {
+fn add_products(lower: &mut Mat<f64>, a: MatRef<'_, f64>) {
     let par = parallelism((lower.nrows() * lower.nrows() * a.ncols()) as f64);
     triangular::matmul(
         lower.as_mut(),
         BlockStructure::TriangularLower,
         Accum::Add,
-        a.as_ref(),
+        a,
         BlockStructure::Rectangular,
         a.transpose(),
         BlockStructure::Rectangular,

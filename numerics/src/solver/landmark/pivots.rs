@@ -14,6 +14,9 @@ use crate::sums::regularization::Regularization;
 /// Points among which landmarks are chosen.
 pub(super) const SAMPLE: usize = 10_000;
 
+/// Points at which the landmarks are looked at before all points are, or fewer than twice as many.
+const LOOKED_AT: usize = 50_000;
+
 /// Most landmarks, over the number of points among which they are chosen. With more, their matrix is no
 /// smaller task than that of all points.
 const MOST: f64 = 0.25;
@@ -53,6 +56,26 @@ impl Chosen {
             points.sort_unstable();
         }
         Self::among(system, points, observer)
+    }
+
+    /// Points of another sample at which too much remains.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub(super) fn beyond_at_some(&self, system: &System, observer: &dyn Observer) -> Result<Vec<usize>> {
+        let n = system.n_points();
+        let step = (n / LOOKED_AT).max(1);
+        let points: Vec<usize> = (0..n).step_by(step).collect();
+        let some = system.at(&points)?;
+        let mut beyond = Vec::new();
+        self.rows.for_each_block(&some, observer, |range, block| {
+            for (at, remaining) in range.zip(block.remaining) {
+                if *remaining > self.tolerance {
+                    beyond.push(points[at]);
+                }
+            }
+        })?;
+        Ok(beyond)
     }
 
     /// Chooses again, among the landmarks and points at which too much remains.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Mat, MatMut, MatRef};
+use rayon::prelude::*;
 
 use crate::error::Result;
 use crate::kernel::Kernel;
@@ -136,8 +137,9 @@ impl Rows {
         fill_cross_gram(&self.nodes, kernel, block, numbers, observer)?;
         let mut columns = MatMut::from_column_major_slice_mut(numbers, rank, block.n_points());
         self.whiten(columns.as_mut());
-        let explained = |j: usize| columns.as_ref().col(j).squared_norm_l2();
-        let remaining = (0..block.n_points()).map(|j| kernel.at_zero() - explained(j)).collect();
+        let whitened = columns.as_ref();
+        let left = |j: usize| kernel.at_zero() - whitened.col(j).squared_norm_l2();
+        let remaining = (0..block.n_points()).into_par_iter().map(left).collect();
         if self.coordinates == Coordinates::AtLandmarks {
             self.solve_upper(columns);
         }
