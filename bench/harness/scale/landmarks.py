@@ -43,7 +43,9 @@ class Landmarks:
 
         def ours() -> Entry:
             n, m = self.setting.size(2_000, 500), self.setting.size(1_000, 100)
-            found, dense = (self._posterior(n, m, {**request, "kernel": kernel, "solver": s}, N_ROUNDS) for s in ("landmark", "dense"))
+            found, dense = (
+                self._posterior(n, m, {**request, "kernel": kernel, "solver": s}, N_ROUNDS) for s in ("landmark", "dense")
+            )
             ratio = {"over dense": Figure(found.seconds / dense.seconds)}
             return entry(OURS, found, {**off(found, dense), **ratio}, notes_of(found))
 
@@ -85,8 +87,11 @@ class Landmarks:
             few = self.setting.size(4_000, 1_000)
             found, dense = (self._posterior(few, 1_000, {**request, "solver": s}) for s in ("landmark", "dense"))
             work = self._posterior(n, m, request)
-            error = {"rms error": Figure(float(np.sqrt(np.mean((work.arrays["means"].ravel() - wave(queries(m))) ** 2))))}
-            return entry(OURS, work, {**off(found, dense), **error, **said(work)}, f"the first two at n = {few:,}; {notes_of(work)}")
+            misses = work.arrays["means"].ravel() - wave(queries(m))
+            error = {"rms error": Figure(float(np.sqrt(np.mean(misses**2))))}
+            return entry(
+                OURS, work, {**off(found, dense), **error, **said(work)}, f"the first two at n = {few:,}; {notes_of(work)}"
+            )
 
         what = f"posterior mean and variance, Gauss ℓ = 1, α = 1e-4, torus, n = {n:,}, m = {m:,}"
         return Work(what, (*costs(45, 1.5), *accurate(1e-6, 1e-6)), {}, ours, nobody)
