@@ -209,9 +209,9 @@ impl Landmarks {
         let (n, k) = (values.nrows(), values.ncols());
         let columns: Vec<f64> =
             (0..k).flat_map(|j| (0..n).map(move |i| (i, j))).map(|at| values[at]).collect();
-        // Unobserved, the passes cannot fail.
+        // Unobserved, the passes cannot fail. If they did, there would be no weights rather than wrong ones.
         let fitted = self.unknowns(&columns, k, &Unobserved).and_then(|x| self.at_points(&x, k, &Unobserved));
-        let Ok(at_points) = fitted else { return };
+        let Ok(at_points) = fitted else { return values.fill(f64::NAN) };
         for (j, (list, at_points)) in columns.chunks_exact(n).zip(at_points.chunks_exact(n)).enumerate() {
             let weights = self.weights(list, at_points);
             weights.iter().enumerate().for_each(|(i, w)| values[(i, j)] = *w);
@@ -226,7 +226,7 @@ impl Landmarks {
         self.rows.to_row(g.as_mut());
         self.solve_inner(g.as_mut());
         let g: Vec<f64> = (0..k).flat_map(|j| g.col(j).iter().copied().collect::<Vec<_>>()).collect();
-        let Ok(at_points) = self.at_points(&g, k, &Unobserved) else { return };
+        let Ok(at_points) = self.at_points(&g, k, &Unobserved) else { return functionals.fill(f64::NAN) };
         for j in 0..k {
             for i in 0..n {
                 functionals[(i, j)] = self.weighing.weights[i] * at_points[j * n + i];

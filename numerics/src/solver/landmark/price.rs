@@ -13,8 +13,8 @@ pub(crate) fn on_landmarks(sizes: Sizes) -> Sizes {
     Sizes { n_points: sizes.n_points.min(EXPECTED), ..sizes }
 }
 
-/// The price of choosing landmarks and of their normal equations: a pass over the points, and another one for
-/// the constant 1.
+/// The price of choosing landmarks and of their normal equations: a pass over the points, and part of another
+/// one, since some landmarks are completed.
 pub(crate) fn landmark_price(n_points: usize, dimension: usize) -> Price {
     let rank = EXPECTED.min(n_points);
     let n_numbers = (SAMPLE.min(n_points) * rank)
