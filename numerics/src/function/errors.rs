@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::functionals::{Covariant, JetFunctional};
 use super::interpolant::Interpolant;
-use crate::error::{NumericsError, Result};
+use crate::error::Result;
 use crate::kernel::Kernel;
 use crate::machine::vector::dot;
 use crate::observer::{Observer, Stage};
@@ -68,7 +68,7 @@ impl Judgement<'_> {
         let (solver, n) = (&interpolant.solver, interpolant.solver.n_points());
         let cloud = solver.cloud();
         observer.checkpoint()?;
-        let weights = self.weights_on_values(functionals)?;
+        let weights = self.weights_on_values(functionals, observer)?;
         observer.enter(Stage::Evaluate);
         let mut covariances = vec![0.0; n * functionals.len()];
         Covariant::of(cloud, process.kernel).fill(functionals, queries, &mut covariances);
@@ -101,23 +101,20 @@ impl Judgement<'_> {
     /// Returns w of each functional, its weights on the values: `[functionals, n]`.
     ///
     /// If the function has a mean, w includes the estimate of its coefficients from the values.
-    fn weights_on_values(&self, functionals: &[JetFunctional]) -> Result<Vec<f64>> {
+    fn weights_on_values(&self, functionals: &[JetFunctional], observer: &dyn Observer) -> Result<Vec<f64>> {
         let Self { interpolant, queries, .. } = self;
         let (solver, n) = (&interpolant.solver, interpolant.solver.n_points());
         let mut weights = vec![0.0; n * functionals.len()];
         Covariant::of(solver.cloud(), solver.kernel()).fill(functionals, queries, &mut weights);
-        solver.solve_transposed_in_place(MatMut::from_column_major_slice_mut(
-            &mut weights,
-            n,
-            functionals.len(),
-        ));
+        let columns = MatMut::from_column_major_slice_mut(&mut weights, n, functionals.len());
+        solver.solve_transposed_in_place(columns, observer)?;
         let Some(trend) = &interpolant.solution.trend else { return Ok(weights) };
         let basis = trend.basis();
         let exact = |at: usize| {
             let functional: &JetFunctional = &functionals[at];
             Some(functional.on_mean(basis, queries.point(functional.query)))
         };
-        basis.make_exact(solver, &mut weights, exact).ok_or(NumericsError::MeanNotDetermined)?;
+        basis.make_exact(solver, &mut weights, exact, observer)?;
         Ok(weights)
     }
 }

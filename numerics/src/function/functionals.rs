@@ -213,7 +213,8 @@ pub(crate) fn deviations(
         check_smooth_at(solver.cloud(), kernel, queries)?;
     }
     let covariances = Covariant::of(solver.known_points(), kernel);
-    let of_mean = solution.trend.as_ref().map(|trend| MeanVariance::of(solver, trend)).transpose()?;
+    let of_mean =
+        solution.trend.as_ref().map(|trend| MeanVariance::of(solver, trend, observer)).transpose()?;
     let (mut found, mut clamped) = (Vec::with_capacity(functionals.len()), Vec::new());
     for block in functionals.chunks(COLUMNS_AT_ONCE) {
         observer.checkpoint()?;

@@ -8,7 +8,7 @@ use faer::{Mat, MatMut};
 
 use crate::error::{NumericsError, Result};
 use crate::machine::vector::dot;
-use crate::observer::Unobserved;
+use crate::observer::Observer;
 use crate::solver::trend::{Basis, Trend, solve_gram};
 use crate::solver::{Solver, Whitened};
 
@@ -23,16 +23,15 @@ pub(super) struct MeanVariance<'a> {
 
 impl<'a> MeanVariance<'a> {
     /// # Errors
-    /// [`NumericsError::NotPositiveDefinite`]
-    /// without a Cholesky factor. [`NumericsError::MeanNotDetermined`].
-    pub(super) fn of(solver: &Solver, trend: &'a Trend) -> Result<Self> {
+    /// [`NumericsError::NotPositiveDefinite`] without a Cholesky factor. [`NumericsError::MeanNotDetermined`],
+    /// [`NumericsError::Cancelled`].
+    pub(super) fn of(solver: &Solver, trend: &'a Trend, observer: &dyn Observer) -> Result<Self> {
         let (basis, n) = (trend.basis(), solver.n_points());
         let p = basis.n_functions();
         let columns = basis.columns(solver.cloud());
-        // Unobserved, since a few columns take no time.
-        let whitened = solver.whitened_values(columns.clone(), &Unobserved)?;
+        let whitened = solver.whitened_values(columns.clone(), observer)?;
         let mut weights = columns.clone();
-        solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, p));
+        solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, p), observer)?;
         let gram = Mat::from_fn(p, p, |a, b| dot(&columns[a * n..][..n], &weights[b * n..][..n]));
         let inverse = solve_gram(&gram, Mat::identity(p, p)).ok_or(NumericsError::MeanNotDetermined)?;
         Ok(Self { basis, whitened, inverse })

@@ -99,7 +99,7 @@ pub fn variances_with_mean(
     solver.cloud().check_same_dimension(queries)?;
     let k0 = solver.kernel().at_zero();
     let nodes = Nodes::of(solver.known_points());
-    let of_mean = trend.map(|trend| MeanVariance::of(solver, trend)).transpose()?;
+    let of_mean = trend.map(|trend| MeanVariance::of(solver, trend, observer)).transpose()?;
     let mut variances = Variances { latent: Vec::with_capacity(queries.n_points()), clamped: Vec::new() };
     for rows in queries.coordinates().chunks(COLUMNS_AT_ONCE * queries.dimension()) {
         let block = Cloud::new(rows.to_vec(), queries.dimension())?;
@@ -176,7 +176,7 @@ pub fn covariance_with_mean(
         }
     }
     if let Some(trend) = trend {
-        add_mean(&mut covariance, &MeanVariance::of(solver, trend)?, queries, v);
+        add_mean(&mut covariance, &MeanVariance::of(solver, trend, observer)?, queries, v);
     }
     mirror(&mut covariance, m);
     Ok(Covariance { latent: covariance, clamped })
@@ -237,7 +237,7 @@ fn check_is_rounding(
     let mut w = vec![0.0; n];
     let at_query = Cloud::new(x.to_vec(), x.len())?;
     fill_cross_gram(nodes, solver.kernel(), &at_query, &mut w, observer)?;
-    solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut w, n, 1));
+    solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut w, n, 1), observer)?;
     let norm_squared: f64 = w.par_iter().map(|w| w * w).sum();
     let tolerance = 4.0 * f64::EPSILON * (solver.kernel().at_zero() + solver.norm1() * norm_squared);
     if -variance <= tolerance { Ok(()) } else { Err(negative(solver, query, variance)) }

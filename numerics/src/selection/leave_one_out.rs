@@ -78,7 +78,7 @@ pub fn leave_one_out(
     observer.enter(Stage::Solve);
     let mut diagonal = inverse_diagonal(solver, observer)?;
     if let Some(trend) = &solution.trend {
-        remove_mean(&mut diagonal, solver, trend)?;
+        remove_mean(&mut diagonal, solver, trend, observer)?;
     }
     Ok(LeaveOneOut::of(values, &solution.weights, &diagonal, solver.regularization(), factor))
 }
@@ -125,11 +125,12 @@ fn inverse_diagonal(solver: &Solver, observer: &dyn Observer) -> Result<Vec<f64>
 }
 
 /// Turns `W_ii` into `P_ii`: subtracts the diagonal of `WF(FᵀWF)⁻¹FᵀW`.
-fn remove_mean(diagonal: &mut [f64], solver: &Solver, trend: &Trend) -> Result<()> {
+fn remove_mean(diagonal: &mut [f64], solver: &Solver, trend: &Trend, observer: &dyn Observer) -> Result<()> {
     let (n, basis) = (diagonal.len(), trend.basis());
-    let functionals = basis.functionals(solver).ok_or(NumericsError::MeanNotDetermined)?;
+    let functionals = basis.functionals(solver, observer)?;
     let mut weights = basis.columns(solver.cloud());
-    solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, basis.n_functions()));
+    let columns = MatMut::from_column_major_slice_mut(&mut weights, n, basis.n_functions());
+    solver.solve_in_place(columns, observer)?;
     for (i, p) in diagonal.iter_mut().enumerate() {
         let pairs = weights.chunks_exact(n).zip(functionals.chunks_exact(n));
         let left = *p - pairs.map(|(weight, functional)| weight[i] * functional[i]).sum::<f64>();

@@ -105,7 +105,9 @@ mod tests {
             }
             let of = |solver: &Solver| {
                 let mut x: Vec<f64> = (0..n).map(|i| (i as f64).cos()).collect();
-                solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut x, n, 1));
+                solver
+                    .solve_in_place(MatMut::from_column_major_slice_mut(&mut x, n, 1), &Unobserved)
+                    .unwrap();
                 (x, solver.log_determinant().unwrap())
             };
             let again =

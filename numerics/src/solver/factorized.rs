@@ -105,9 +105,9 @@ impl Solver {
         observer.enter(Stage::Condition);
         let (inverse_norm1, weights_of_one) = estimate_norm1(
             cloud.n_points(),
-            |x| factorization.solve_in_place(x),
-            |x| factorization.solve_transposed_in_place(x),
-        );
+            |x| factorization.solve_in_place(x, observer),
+            |x| factorization.solve_transposed_in_place(x, observer),
+        )?;
         let product = norm1 * inverse_norm1;
         let reciprocal_condition = if product.is_finite() { 1.0 / product.max(1.0) } else { 0.0 };
         Ok(Self { system, factorization, norm1, reciprocal_condition, weights_of_one })
@@ -158,15 +158,18 @@ impl Solver {
         self.reciprocal_condition
     }
 
-    /// `W·1`, `[n]`: the weights of the signature function. Landmarks find them when they are needed.
-    pub(super) fn weights_of_one(&self) -> Cow<'_, [f64]> {
+    /// `W·1`, `[n]`: the weights of the signature function. Only factorizations of the whole matrix keep them.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Solver::solve_in_place`].
+    pub(super) fn weights_of_one(&self, observer: &dyn Observer) -> Result<Cow<'_, [f64]>> {
         if !self.weights_of_one.is_empty() {
-            return Cow::Borrowed(&self.weights_of_one);
+            return Ok(Cow::Borrowed(&self.weights_of_one));
         }
         let n = self.system.n_points();
         let mut weights = vec![1.0; n];
-        self.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, 1));
-        Cow::Owned(weights)
+        self.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, 1), observer)?;
+        Ok(Cow::Owned(weights))
     }
 
     /// `‖K + αI‖₁`; for landmarks, the largest of some columns.
@@ -196,16 +199,26 @@ impl Solver {
     }
 
     /// Overwrites the columns of `[n, k]` values by weights at all points, `Λ = W Y`.
-    pub(crate) fn solve_in_place(&self, values: MatMut<'_, f64>) {
-        self.factorization.solve_in_place(values);
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub(crate) fn solve_in_place(&self, values: MatMut<'_, f64>, observer: &dyn Observer) -> Result<()> {
+        self.factorization.solve_in_place(values, observer)
     }
 
     /// Overwrites the columns of `[n, k]` by `Wᵀ` times them.
     ///
     /// This turns functionals of the weights into functionals of the values, so that operators become
     /// matrices.
-    pub(crate) fn solve_transposed_in_place(&self, functionals: MatMut<'_, f64>) {
-        self.factorization.solve_transposed_in_place(functionals);
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub(crate) fn solve_transposed_in_place(
+        &self,
+        functionals: MatMut<'_, f64>,
+        observer: &dyn Observer,
+    ) -> Result<()> {
+        self.factorization.solve_transposed_in_place(functionals, observer)
     }
 
     /// The points whose covariances with a functional say what the values know of it.
@@ -397,19 +410,21 @@ impl Whitened {
 }
 
 impl Factorization {
-    fn solve_in_place(&self, values: MatMut<'_, f64>) {
+    fn solve_in_place(&self, values: MatMut<'_, f64>, observer: &dyn Observer) -> Result<()> {
         match self {
             Self::Cholesky(factor) => factor.solve_in_place(values),
             Self::PivotedCholesky { factor, .. } => factor.solve_in_place(values),
-            Self::Landmark(landmarks) => landmarks.solve_in_place(values),
+            Self::Landmark(landmarks) => landmarks.solve_in_place(values, observer)?,
         }
+        Ok(())
     }
 
-    fn solve_transposed_in_place(&self, functionals: MatMut<'_, f64>) {
+    fn solve_transposed_in_place(&self, functionals: MatMut<'_, f64>, observer: &dyn Observer) -> Result<()> {
         match self {
             Self::Cholesky(factor) => factor.solve_in_place(functionals),
             Self::PivotedCholesky { factor, .. } => factor.solve_transposed_in_place(functionals),
-            Self::Landmark(landmarks) => landmarks.solve_transposed_in_place(functionals),
+            Self::Landmark(landmarks) => landmarks.solve_transposed_in_place(functionals, observer)?,
         }
+        Ok(())
     }
 }

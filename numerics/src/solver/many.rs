@@ -36,7 +36,7 @@ impl Solution {
             return lists.map(|list| Self::with_mean(solver, list, mean, observer)).collect();
         }
         observer.enter(Stage::Solve);
-        let trends = Trend::fit_each(solver, values, mean)?;
+        let trends = Trend::fit_each(solver, values, mean, observer)?;
         let rest = match &trends {
             None => Cow::Borrowed(values),
             Some(trends) => {
@@ -63,7 +63,8 @@ impl Solution {
     ) -> Result<()> {
         let (n, cloud) = (solver.n_points(), solver.cloud());
         let mut weights = lists.to_vec();
-        solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, lists.len() / n));
+        let columns = MatMut::from_column_major_slice_mut(&mut weights, n, lists.len() / n);
+        solver.solve_in_place(columns, observer)?;
         if weights.iter().any(|weight| !weight.is_finite()) {
             return Err(NumericsError::WeightsOverflow);
         }

@@ -73,7 +73,7 @@ impl Solution {
     pub fn with_mean(solver: &Solver, values: &[f64], mean: Mean, observer: &dyn Observer) -> Result<Self> {
         solver.cloud().check_one_per_point(values)?;
         observer.enter(Stage::Solve);
-        let found = match Trend::fit(solver, values, mean)? {
+        let found = match Trend::fit(solver, values, mean, observer)? {
             None => Self::of(solver, values, observer)?,
             Some(trend) => {
                 let rest = trend.removed_from(values, solver.cloud());
@@ -111,11 +111,15 @@ impl Solution {
         }
         let candidate = |weights| Candidate::new(solver, values, weights, order, observer);
         let is_one = values.iter().all(|&value| value == 1.0);
-        let weights = if is_one { solver.weights_of_one().into_owned() } else { solve(solver, values) };
+        let weights = if is_one {
+            solver.weights_of_one(observer)?.into_owned()
+        } else {
+            solve(solver, values, observer)?
+        };
         let mut best = candidate(weights)?;
         let mut refined = false;
         if best.wants_refinement(solver, values) {
-            let correction = solve(solver, &best.residual);
+            let correction = solve(solver, &best.residual, observer)?;
             let weights = best.weights.iter().zip(&correction).map(|(a, b)| a + b).collect();
             match candidate(weights) {
                 Ok(next) if next.relative_residual(values) < best.relative_residual(values) => {
@@ -170,11 +174,11 @@ impl Solution {
     }
 }
 
-fn solve(solver: &Solver, values: &[f64]) -> Vec<f64> {
+fn solve(solver: &Solver, values: &[f64], observer: &dyn Observer) -> Result<Vec<f64>> {
     let mut weights = values.to_vec();
     let n = weights.len();
-    solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, 1));
-    weights
+    solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, 1), observer)?;
+    Ok(weights)
 }
 
 /// Weights at all points with their residual, and with `KΛ` evaluated afresh from the kernel.

@@ -97,8 +97,10 @@ fn the_transposed_solve_is_the_transpose() {
         let vector = |s: f64| (0..90).map(|i| (s * i as f64).sin()).collect::<Vec<f64>>();
         let (y, g) = (vector(0.9), vector(0.4));
         let (mut wy, mut wtg) = (y.clone(), g.clone());
-        solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut wy, 90, 1));
-        solver.solve_transposed_in_place(MatMut::from_column_major_slice_mut(&mut wtg, 90, 1));
+        solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut wy, 90, 1), &Unobserved).unwrap();
+        solver
+            .solve_transposed_in_place(MatMut::from_column_major_slice_mut(&mut wtg, 90, 1), &Unobserved)
+            .unwrap();
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let (left, right) = (dot(&g, &wy), dot(&wtg, &y));
         let scale = dot(&wy, &wy).sqrt() * 10.0;
@@ -241,7 +243,7 @@ fn nothing_of_what_was_in_the_memory_before_is_read() {
     for n_columns in [1, 2, 70] {
         let solve = |solver: &Solver| {
             let mut columns = Mat::from_fn(1300, n_columns, |i, j| (0.1 * (i * (j + 1)) as f64).sin());
-            solver.solve_in_place(columns.as_mut());
+            solver.solve_in_place(columns.as_mut(), &Unobserved).unwrap();
             solver.whiten_in_place(columns.as_mut(), &Unobserved).unwrap();
             columns
         };
@@ -257,7 +259,7 @@ fn the_reciprocal_condition_is_within_a_factor_three_of_the_true_one() {
         for alpha in [1e-6, 1e-2] {
             let solver = dense(&cloud, family, 0.6, alpha);
             let mut inverse = Mat::<f64>::identity(n, n);
-            solver.solve_in_place(inverse.as_mut());
+            solver.solve_in_place(inverse.as_mut(), &Unobserved).unwrap();
             let norm1 = (0..n).map(|j| inverse.col(j).norm_l1()).fold(0.0, f64::max);
             let ratio = solver.reciprocal_condition() * solver.norm1() * norm1;
             assert!((1.0 - 1e-6..3.0).contains(&ratio), "{family:?}, {alpha}: {ratio}");

@@ -13,6 +13,7 @@ use super::Solver;
 use crate::error::{NumericsError, Result};
 use crate::machine::heap::vec_bytes;
 use crate::machine::vector::dot;
+use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 
 /// Functions that a mean combines.
@@ -78,31 +79,39 @@ impl Basis {
         slopes.for_each(|(function, component)| *function += component / self.size);
     }
 
-    /// Returns `(FᵀWF)⁻¹FᵀW`, `[p, n]`: the coefficients of the mean as functionals of the values. `None` if
-    /// the points do not distinguish the functions.
-    pub(crate) fn functionals(&self, solver: &Solver) -> Option<Vec<f64>> {
+    /// Returns `(FᵀWF)⁻¹FᵀW`, `[p, n]`: the coefficients of the mean as functionals of the values.
+    ///
+    /// # Errors
+    /// [`NumericsError::MeanNotDetermined`] if the points do not distinguish the functions, and the errors of
+    /// [`Solver::solve_in_place`].
+    pub(crate) fn functionals(&self, solver: &Solver, observer: &dyn Observer) -> Result<Vec<f64>> {
         let (n, p) = (solver.n_points(), self.n_functions());
         let columns = self.columns(solver.cloud());
         let mut weights = columns.clone();
-        solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, p));
+        solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, p), observer)?;
         let gram = Mat::from_fn(p, p, |a, b| dot(&columns[a * n..][..n], &weights[b * n..][..n]));
-        let solved = solve_gram(&gram, Mat::from_fn(p, n, |a, i| weights[a * n + i]))?;
-        Some((0..p * n).map(|at| solved[(at / n, at % n)]).collect())
+        let solved = solve_gram(&gram, Mat::from_fn(p, n, |a, i| weights[a * n + i]));
+        let solved = solved.ok_or(NumericsError::MeanNotDetermined)?;
+        Ok((0..p * n).map(|at| solved[(at / n, at % n)]).collect())
     }
 
     /// Turns rows that weigh the values without their mean, `[rows, n]`, into rows that weigh the values:
     /// `row − (row F − exact)(FᵀWF)⁻¹FᵀW`.
     ///
     /// `exact` gives what a row must yield on each of the functions. A row for which it gives nothing is left
-    /// as it is. `None` if the points do not distinguish the functions.
+    /// as it is.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Basis::functionals`].
     pub(crate) fn make_exact(
         &self,
         solver: &Solver,
         rows: &mut [f64],
         exact: impl Fn(usize) -> Option<Vec<f64>> + Sync,
-    ) -> Option<()> {
+        observer: &dyn Observer,
+    ) -> Result<()> {
         let n = solver.n_points();
-        let (of_values, columns) = (self.functionals(solver)?, self.columns(solver.cloud()));
+        let (of_values, columns) = (self.functionals(solver, observer)?, self.columns(solver.cloud()));
         rows.par_chunks_mut(n).enumerate().for_each(|(index, row)| {
             let Some(exact) = exact(index) else { return };
             let found = columns.chunks_exact(n).map(|function| dot(function, row));
@@ -111,7 +120,7 @@ impl Basis {
                 row.iter_mut().zip(functional).for_each(|(entry, f)| *entry -= excess * f);
             }
         });
-        Some(())
+        Ok(())
     }
 
     /// Returns the functions at the points of a cloud, `[n, p]` column by column.
@@ -165,26 +174,38 @@ impl Trend {
     /// Finds the mean of values `[n]` under a solver. `None` for [`Mean::Zero`].
     ///
     /// # Errors
-    /// [`NumericsError::MeanNotDetermined`] if the points do not distinguish its functions.
-    pub(crate) fn fit(solver: &Solver, values: &[f64], mean: Mean) -> Result<Option<Self>> {
-        Ok(Self::fit_each(solver, values, mean)?.map(|mut trends| trends.remove(0)))
+    /// [`NumericsError::MeanNotDetermined`] if the points do not distinguish its functions, and the errors of
+    /// [`Solver::solve_in_place`].
+    pub(crate) fn fit(
+        solver: &Solver,
+        values: &[f64],
+        mean: Mean,
+        observer: &dyn Observer,
+    ) -> Result<Option<Self>> {
+        Ok(Self::fit_each(solver, values, mean, observer)?.map(|mut trends| trends.remove(0)))
     }
 
     /// Finds the mean of each of k lists of values `[k, n]`.
     ///
     /// # Errors
     /// Returns the errors of [`Trend::fit`].
-    pub(super) fn fit_each(solver: &Solver, values: &[f64], mean: Mean) -> Result<Option<Vec<Self>>> {
+    pub(super) fn fit_each(
+        solver: &Solver,
+        values: &[f64],
+        mean: Mean,
+        observer: &dyn Observer,
+    ) -> Result<Option<Vec<Self>>> {
         if mean == Mean::Zero {
             return Ok(None);
         }
         let (cloud, n) = (solver.cloud(), solver.n_points());
         let basis = Basis::of(mean, cloud);
         let columns = basis.columns(cloud);
-        let mut weights = solver.weights_of_one().into_owned();
+        let mut weights = solver.weights_of_one(observer)?.into_owned();
         weights.extend_from_slice(&columns[n..]);
         let p = basis.n_functions();
-        solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights[n..], n, p - 1));
+        let others = MatMut::from_column_major_slice_mut(&mut weights[n..], n, p - 1);
+        solver.solve_in_place(others, observer)?;
         // The average of a list is subtracted first, since it would cost digits of the differences.
         let lists = values.chunks_exact(n);
         let shared: Vec<f64> = lists.clone().map(|list| list.iter().sum::<f64>() / n as f64).collect();

@@ -1,5 +1,7 @@
 //! Matrices of an evaluation, whose memory the next evaluation reuses.
 
+use std::convert::Infallible;
+
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
 use faer::linalg::matmul::matmul;
@@ -127,8 +129,9 @@ impl Matrices {
         let solve = |mut columns: MatMut<'_, f64>| {
             solve_lower_triangular_in_place(self.factor(), columns.rb_mut(), self.par);
             solve_upper_triangular_in_place(self.factor().transpose(), columns, self.par);
+            Ok::<(), Infallible>(())
         };
-        let (of_inverse, _) = estimate_norm1(self.n, solve, solve);
+        let Ok((of_inverse, _)) = estimate_norm1(self.n, solve, solve);
         let product = self.norm1 * of_inverse;
         if product.is_finite() { 1.0 / product } else { 0.0 }
     }

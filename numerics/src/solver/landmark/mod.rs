@@ -34,6 +34,7 @@ pub(crate) mod price;
 mod residual;
 mod rows;
 
+use std::convert::Infallible;
 use std::sync::Arc;
 
 use faer::linalg::matmul::matmul;
@@ -46,7 +47,7 @@ use crate::error::Result;
 use crate::machine::heap::vec_bytes;
 use crate::machine::parallelism::parallelism;
 use crate::machine::vector::dot;
-use crate::observer::{Observer, Stage, Unobserved};
+use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
 use normal::NormalEquations;
 use pivots::Chosen;
@@ -163,14 +164,18 @@ impl Landmarks {
     /// Reciprocal condition of the normal equations, estimated in the 1-norm.
     pub(super) fn reciprocal_condition(&self) -> f64 {
         let rank = self.rank();
-        let solve = |x: MatMut<'_, f64>| self.solve_inner(x);
+        let solve = |x: MatMut<'_, f64>| {
+            self.solve_inner(x);
+            Ok::<(), Infallible>(())
+        };
         let product = |mut x: MatMut<'_, f64>| {
             let lower = Mat::from_fn(rank, rank, |i, j| if i < j { 0.0 } else { self.inner[(i, j)] });
             let y = &lower * (lower.transpose() * x.as_ref());
             x.copy_from(&y);
+            Ok::<(), Infallible>(())
         };
-        let (inverse, _) = estimate_norm1(rank, solve, solve);
-        let (norm, _) = estimate_norm1(rank, product, product);
+        let Ok((inverse, _)) = estimate_norm1(rank, solve, solve);
+        let Ok((norm, _)) = estimate_norm1(rank, product, product);
         let condition = norm * inverse;
         if condition.is_finite() { 1.0 / condition.max(1.0) } else { 0.0 }
     }
@@ -205,33 +210,43 @@ impl Landmarks {
     }
 
     /// Overwrites the columns of `[n, k]` values by `(K̂ + D)⁻¹` times them.
-    pub(super) fn solve_in_place(&self, mut values: MatMut<'_, f64>) {
+    ///
+    /// # Errors
+    /// [`crate::error::NumericsError::Cancelled`].
+    pub(super) fn solve_in_place(&self, mut values: MatMut<'_, f64>, observer: &dyn Observer) -> Result<()> {
         let (n, k) = (values.nrows(), values.ncols());
         let columns: Vec<f64> =
             (0..k).flat_map(|j| (0..n).map(move |i| (i, j))).map(|at| values[at]).collect();
-        // Unobserved, the passes cannot fail. If they did, there would be no weights rather than wrong ones.
-        let fitted = self.unknowns(&columns, k, &Unobserved).and_then(|x| self.at_points(&x, k, &Unobserved));
-        let Ok(at_points) = fitted else { return values.fill(f64::NAN) };
+        let at_points = self.at_points(&self.unknowns(&columns, k, observer)?, k, observer)?;
         for (j, (list, at_points)) in columns.chunks_exact(n).zip(at_points.chunks_exact(n)).enumerate() {
             let weights = self.weights(list, at_points);
             weights.iter().enumerate().for_each(|(i, w)| values[(i, j)] = *w);
         }
+        Ok(())
     }
 
     /// Overwrites functionals of the weights b, given at all points `[n, k]` of which only the landmarks
     /// count, by functionals of the values: `W M (MᵀWM + sK_ZZ⁻¹)⁻¹ K_ZZ⁻¹ f_Z`.
-    pub(super) fn solve_transposed_in_place(&self, mut functionals: MatMut<'_, f64>) {
+    ///
+    /// # Errors
+    /// [`crate::error::NumericsError::Cancelled`].
+    pub(super) fn solve_transposed_in_place(
+        &self,
+        mut functionals: MatMut<'_, f64>,
+        observer: &dyn Observer,
+    ) -> Result<()> {
         let (n, k) = (functionals.nrows(), functionals.ncols());
         let mut g = Mat::from_fn(self.rank(), k, |i, j| functionals[(self.points()[i], j)]);
         self.rows.to_row(g.as_mut());
         self.solve_inner(g.as_mut());
         let g: Vec<f64> = (0..k).flat_map(|j| g.col(j).iter().copied().collect::<Vec<_>>()).collect();
-        let Ok(at_points) = self.at_points(&g, k, &Unobserved) else { return functionals.fill(f64::NAN) };
+        let at_points = self.at_points(&g, k, observer)?;
         for j in 0..k {
             for i in 0..n {
                 functionals[(i, j)] = self.weighing.weights[i] * at_points[j * n + i];
             }
         }
+        Ok(())
     }
 
     /// Whitens covariances with the landmarks, `[r, k]` column by column, to `[2 r, k]`: `L₁₁⁻¹c` above

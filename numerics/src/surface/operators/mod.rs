@@ -100,7 +100,9 @@ impl Operator {
         mean: Mean,
         observer: &dyn Observer,
     ) -> Result<Vec<f64>> {
-        with_mean(operator_matrix(geometry, solver, queries, self, observer)?, geometry, solver, mean, self)
+        let mut matrix = operator_matrix(geometry, solver, queries, self, observer)?;
+        OnMean { geometry, solver, mean, operator: self }.make_exact(&mut matrix, observer)?;
+        Ok(matrix)
     }
 }
 
@@ -176,7 +178,8 @@ fn operator_matrix(
     for rows in matrix.chunks_mut(n * ROWS_PER_SOLVE) {
         observer.checkpoint()?;
         let count = rows.len() / n;
-        solver.solve_transposed_in_place(MatMut::from_column_major_slice_mut(rows, n, count));
+        let columns = MatMut::from_column_major_slice_mut(rows, n, count);
+        solver.solve_transposed_in_place(columns, observer)?;
     }
     // Without branches, so that it is vectorised.
     let is_finite = |row: &[f64]| row.iter().fold(true, |all, x| all & x.is_finite());
@@ -186,29 +189,33 @@ fn operator_matrix(
     }
 }
 
-/// Turns the matrix `BW` into that for functions with a mean, `BW − (BWF − LF)(FᵀWF)⁻¹FᵀW`.
-///
-/// F are the mean's functions at the nodes, and LF is the operator on them. On constants, and for a linear
-/// mean on coordinates, the result is the operator itself.
-fn with_mean(
-    mut matrix: Vec<f64>,
-    geometry: &Geometry,
-    solver: &Solver,
+/// What a matrix must yield on the functions of a mean.
+struct OnMean<'a> {
+    geometry: &'a Geometry,
+    solver: &'a Solver,
     mean: Mean,
     operator: Operator,
-) -> Result<Vec<f64>> {
-    if mean == Mean::Zero {
-        return Ok(matrix);
+}
+
+impl OnMean<'_> {
+    /// Turns the matrix `BW` into that for functions with a mean, `BW − (BWF − LF)(FᵀWF)⁻¹FᵀW`.
+    ///
+    /// F are the mean's functions at the nodes, and LF is the operator on them. On constants, and for a
+    /// linear mean on coordinates, the result is the operator itself.
+    fn make_exact(&self, matrix: &mut [f64], observer: &dyn Observer) -> Result<()> {
+        let &Self { geometry, solver, mean, operator } = self;
+        if mean == Mean::Zero {
+            return Ok(());
+        }
+        let (basis, m) = (Basis::of(mean, solver.cloud()), geometry.n_queries());
+        let exact = |index: usize| {
+            let (component, query) = (index / m, index % m);
+            let mut exact = vec![0.0; basis.n_functions()];
+            basis.add_slopes(&on_coordinates(geometry, operator, component, query), &mut exact);
+            Some(exact).filter(|_| !geometry.is_null()[query])
+        };
+        basis.make_exact(solver, matrix, exact, observer)
     }
-    let (basis, m) = (Basis::of(mean, solver.cloud()), geometry.n_queries());
-    let exact = |index: usize| {
-        let (component, query) = (index / m, index % m);
-        let mut exact = vec![0.0; basis.n_functions()];
-        basis.add_slopes(&on_coordinates(geometry, operator, component, query), &mut exact);
-        Some(exact).filter(|_| !geometry.is_null()[query])
-    };
-    basis.make_exact(solver, &mut matrix, exact).ok_or(NumericsError::MeanNotDetermined)?;
-    Ok(matrix)
 }
 
 /// Returns the vector `[d]` whose product with the gradient of a linear function is the operator on it: a row
