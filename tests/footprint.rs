@@ -109,6 +109,7 @@ async fn keep_weights(store: &Factors, k: usize) {
         native_norm_squared: 0.0,
         misfit: 0.0,
         refined: false,
+        n_iterations: None,
         energy: 0.0,
         trend: None,
         outlier: None,

@@ -78,6 +78,10 @@ pub enum NumericsError {
         "the kernel needs more than {most} landmarks for these points: it is too rough, or its length scale too short"
     )]
     RankTooLarge { most: usize },
+    #[error(
+        "the iteration ends at a relative residual of {relative_residual:.1e}, above the tolerance of {tolerance:.1e}"
+    )]
+    NotConverged { relative_residual: f64, tolerance: f64 },
     #[error("the computation was cancelled")]
     Cancelled,
 }
@@ -106,6 +110,8 @@ pub enum SolverKind {
     Dense,
     /// Weights at a few points, whose kernels span those of the others.
     Landmark,
+    /// Conjugate gradients.
+    Iterative,
     /// Local fits to the nearest points of each query.
     Local,
 }
@@ -115,6 +121,8 @@ pub enum SolverKind {
 pub enum Quantity {
     /// The diagonal of `(K + αI)⁻¹`.
     InverseDiagonal,
+    /// The likelihood, or its determinant.
+    Likelihood,
     /// A matrix with a column for each point.
     DenseMatrix,
     /// Values at queries, for which the solver has no weights.

@@ -77,9 +77,15 @@ impl FitKey {
             SolverKind::Landmark => {
                 hasher.update(b"landmark");
             }
+            SolverKind::Iterative => {
+                hasher.update(b"iterative");
+            }
             SolverKind::Local => {
                 hasher.update(b"local");
             }
+        }
+        if let Some(tolerance) = recipe.tolerance() {
+            update_with_floats(&mut hasher, &[tolerance]);
         }
         if let Some((kernel, regularization)) = recipe.process() {
             hasher.update(&[u8::from(is_merged)]);
@@ -151,6 +157,14 @@ pub enum GivenKernel<'a> {
     Whole(&'a Kernel),
     /// Family and variance. The length scale follows from the cloud, so it is always the same.
     OfCloud(Family, f64),
+}
+
+/// Returns a key of a kernel with its noise.
+pub fn process_key(kernel: &Kernel, regularization: &Regularization) -> [u8; 32] {
+    let mut hasher = blake3::Hasher::new();
+    update_with_kernel(&mut hasher, kernel);
+    update_with_regularization(&mut hasher, regularization);
+    hasher.finalize().into()
 }
 
 fn update_with_kernel(hasher: &mut blake3::Hasher, kernel: &Kernel) {
@@ -248,6 +262,9 @@ mod tests {
             of(0, &kernel(Family::Laplace { epsilon: 0.0 }, 1.0, 1.0), &alpha(0.0), false),
             of(0, &kernel(Family::Laplace { epsilon: 1.0 }, 1.0, 1.0), &alpha(0.0), false),
             of_local(recipe(SolverKind::Local, &gauss, &alpha(0.0))),
+            of_local(recipe(SolverKind::Landmark, &gauss, &alpha(0.0))),
+            of_local(recipe(SolverKind::Iterative, &gauss, &alpha(0.0))),
+            of_local(recipe(SolverKind::Iterative, &gauss, &alpha(0.0)).with_tolerance(1e-6)),
             of_local(Recipe::LocalSurface { learning: None }),
             of_local(Recipe::LocalSurface { learning: Some(Learning::AtSites(cloud.clone().into())) }),
         ];

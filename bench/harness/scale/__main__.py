@@ -17,6 +17,7 @@ from ..report import significant
 from ..setting import N_THREADS, Setting
 from . import growth
 from .data import Dragon, describe
+from .iterative import Iterative
 from .landmarks import Landmarks
 from .level_sets import LevelSets
 from .peers import Peers
@@ -40,7 +41,8 @@ def main() -> None:
     works = {
         **Table(setting, service, peers, dragon).works(),
         **LevelSets(setting, service, peers, dragon).works(),
-        **Landmarks(setting, service).works(),
+        **Landmarks(setting, service, peers).works(),
+        **Iterative(setting, service, peers, dragon).works(),
     }
     chosen = choose([*works, "growth"], arguments.row)
     busy = [machine.busy_cores()]

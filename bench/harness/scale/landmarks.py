@@ -9,6 +9,7 @@ import numpy as np
 from ..clouds import Floats
 from ..setting import Setting
 from .data import torus
+from .peers import Peers
 from .report import OURS, Bound, Entry, Figure, Work
 from .service import Answered, Service
 from .table import costs, entry, notes
@@ -26,6 +27,7 @@ class Landmarks:
 
     setting: Setting
     service: Service
+    peers: Peers
 
     def works(self) -> dict[str, Callable[[], Work]]:
         """Returns the rows by name."""
@@ -49,8 +51,16 @@ class Landmarks:
             ratio = {"over dense": Figure(found.seconds / dense.seconds)}
             return entry(OURS, found, {**off(found, dense), **ratio}, notes_of(found))
 
+        def others() -> Iterable[Entry]:
+            n, m = self.setting.size(2_000, 500), self.setting.size(1_000, 100)
+            points = torus(n).points
+            inputs = {"points": points, "values": noisy(points), "queries": queries(m)}
+            work = self.peers.python("process", inputs, length_scale=kernel["length_scale"], alpha=request["alpha"])
+            yield entry("scikit-learn", work, {})
+
         what = "posterior mean and variance, Gauss ℓ = 1.75, α = 0.01, torus, n = 2,000, m = 1,000"
-        return Work(what, (*accurate(1e-9, 1e-5), Bound("rank", "≤", 350)), {}, ours, nobody)
+        bounds = (Bound("time", "<", "scikit-learn"), *accurate(1e-9, 1e-5), Bound("rank", "≤", 350))
+        return Work(what, bounds, {}, ours, others)
 
     def beside_dense(self) -> Work:
         request = {"kernel": GAUSS, "alpha": ALPHA}

@@ -65,7 +65,7 @@ class Peers:
         source = self._setting.root / "bench" / "peers" / "cgal_surface.cpp"
         return self._once(["cgal", what, *arguments], source.read_text(), {"points": points}, fastest)
 
-    def python(self, name: str, arrays: Arrays, **arguments: int) -> Done:
+    def python(self, name: str, arrays: Arrays, **arguments: float) -> Done:
         """Runs one of `METHODS`."""
         command = [str(self._setting.python), "-m", "harness.scale.peers", name, json.dumps(arguments)]
 
@@ -135,6 +135,31 @@ def interpolation(points: Floats, values: Floats, queries: Floats, n_neighbours:
     return {"means": RBFInterpolator(points, values, neighbors=n_neighbours)(queries)}
 
 
+def ferreus(points: Floats, values: Floats, queries: Floats, length_scale: float, nugget: float, tolerance: float) -> Arrays:
+    """The exponential kernel by a fast multipole method: means alone. Its kernel is exp(−3 r)."""
+    import ferreus_rbf as library
+    from ferreus_rbf import interpolant_config as options
+
+    accuracy = options.FittingAccuracy(tolerance, options.FittingAccuracyType.Relative)
+    settings = options.InterpolantSettings(
+        options.RBFKernelType.Exponential, drift=options.Drift.None_, nugget=nugget, fitting_accuracy=accuracy
+    )
+    unit = 1 / (3 * length_scale)
+    fitted = library.RBFInterpolator(unit * points, values.reshape(-1, 1), settings)
+    return {"means": np.asarray(fitted.evaluate(unit * queries)).ravel()}
+
+
+def process(points: Floats, values: Floats, queries: Floats, length_scale: float, alpha: float) -> Arrays:
+    """scikit-learn's Gaussian process with fixed hyperparameters: means and variances."""
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import RBF
+
+    kernel = RBF(length_scale / np.sqrt(2), length_scale_bounds="fixed")
+    fitted = GaussianProcessRegressor(kernel, alpha=alpha, optimizer=None).fit(points, values)
+    means, deviations = fitted.predict(queries, return_std=True)
+    return {"means": means, "variances": deviations**2}
+
+
 def poisson(points: Floats, normals: Floats, size: int) -> Arrays:
     """Screened Poisson reconstruction to an octree of depth `size`, from the true normals.
 
@@ -170,6 +195,8 @@ METHODS: dict[str, Callable[..., Arrays]] = {
     "open3d": open3d,
     "laplacian": laplacian,
     "interpolation": interpolation,
+    "ferreus": ferreus,
+    "process": process,
     "poisson": poisson,
     "apss": apss,
 }

@@ -243,9 +243,13 @@ class Table:
         )
 
     def _part(self, cloud: Cloud) -> Cloud:
-        """Returns every point, or about 2,000 of them in a quick run."""
-        kept = slice(None, None, max(1, len(cloud.points) // 2_000) if self.setting.is_quick else 1)
-        return Cloud(cloud.points[kept], cloud.normals[kept])
+        return part(self.setting, cloud)
+
+
+def part(setting: Setting, cloud: Cloud) -> Cloud:
+    """Returns every point, or about 2,000 of them in a quick run."""
+    kept = slice(None, None, max(1, len(cloud.points) // 2_000) if setting.is_quick else 1)
+    return Cloud(cloud.points[kept], cloud.normals[kept])
 
 
 def costs(seconds: float, gigabytes: float) -> tuple[Bound, Bound]:

@@ -71,7 +71,9 @@ impl Batch {
     fn values_at(&self, queries: &Cloud, observer: &dyn Observer) -> Result<Vec<f64>> {
         self.solver.cloud().check_same_dimension(queries)?;
         observer.enter(Stage::Evaluate);
-        let expansion = self.solver.expansion(&[]);
+        let Some(first) = self.solutions.first() else { return Ok(Vec::new()) };
+        // All lists have weights at the same centres, since a solver decides where they are.
+        let expansion = self.solver.expansion(&first.weights);
         let weights: Vec<f64> =
             self.solutions.iter().flat_map(|solution| solution.weights.iter().copied()).collect();
         let mut values = values_of_each(expansion.centres, expansion.kernel, &weights, queries, observer)?;

@@ -23,8 +23,8 @@ pub(super) struct MeanVariance<'a> {
 
 impl<'a> MeanVariance<'a> {
     /// # Errors
-    /// [`NumericsError::NotPositiveDefinite`] without a Cholesky factor. [`NumericsError::MeanNotDetermined`],
-    /// [`NumericsError::Cancelled`].
+    /// [`NumericsError::NotPositiveDefinite`] without a Cholesky factor.
+    /// [`NumericsError::MeanNotDetermined`], [`NumericsError::Cancelled`].
     pub(super) fn of(solver: &Solver, trend: &'a Trend, observer: &dyn Observer) -> Result<Self> {
         let (basis, n) = (trend.basis(), solver.n_points());
         let p = basis.n_functions();

@@ -1,4 +1,4 @@
-//! Rules by which `auto` takes the local solver.
+//! Rules by which `auto` takes another solver than the dense one.
 
 use crate::kernel::defaults::Purpose;
 use crate::patches::MAX_LOCAL_DIMENSION;
@@ -16,9 +16,9 @@ pub const LOCAL_FROM: usize = 5_000;
 /// on, and of 50 all but those too coarse for any method.
 pub const LOCAL_CURVES_FROM: usize = 64;
 
-/// Reason why `auto` chose the local solver.
+/// Reason why `auto` chose another solver than the dense one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AutoLocal {
+pub enum AutoReason {
     /// The cloud has more points than the dense solver accepts.
     BeyondDense,
     /// The cloud has many points, and the work of regressions is linear in them.
@@ -27,6 +27,19 @@ pub enum AutoLocal {
     Deviations,
     /// The level set of a finely sampled curve is requested.
     FineCurve,
+    /// The cloud has more points than the dense solver accepts, and few landmarks span the kernels of all of
+    /// them.
+    FewLandmarks,
+}
+
+/// Flops of landmarks up to which `auto` takes them for values: about twenty seconds.
+const MOST_FLOPS: f64 = 1e12;
+
+/// Returns whether values at more points than the dense solver accepts are fitted on so many landmarks,
+/// rather than around each query.
+pub fn prefers_landmarks(n_points: usize, n_landmarks: usize) -> bool {
+    let rank = n_landmarks as f64;
+    8.0 * n_points as f64 * rank * rank <= MOST_FLOPS
 }
 
 /// A surface known only by its points, before it is fitted.
@@ -39,13 +52,13 @@ pub struct UnfittedSurface {
 }
 
 /// Returns why a surface is better regressed locally, or `None` if it is not.
-pub fn prefers_local(surface: &UnfittedSurface, max_dense_points: usize) -> Option<AutoLocal> {
+pub fn prefers_local(surface: &UnfittedSurface, max_dense_points: usize) -> Option<AutoReason> {
     let UnfittedSurface { n_points, dimension, purpose, has_deviations } = *surface;
     match dimension {
-        2..=MAX_LOCAL_DIMENSION if n_points > max_dense_points => Some(AutoLocal::BeyondDense),
-        2..=MAX_LOCAL_DIMENSION if has_deviations => Some(AutoLocal::Deviations),
-        2..=MAX_LOCAL_DIMENSION if n_points >= LOCAL_FROM => Some(AutoLocal::ManyPoints),
-        2 if purpose == Purpose::LevelSets && n_points >= LOCAL_CURVES_FROM => Some(AutoLocal::FineCurve),
+        2..=MAX_LOCAL_DIMENSION if n_points > max_dense_points => Some(AutoReason::BeyondDense),
+        2..=MAX_LOCAL_DIMENSION if has_deviations => Some(AutoReason::Deviations),
+        2..=MAX_LOCAL_DIMENSION if n_points >= LOCAL_FROM => Some(AutoReason::ManyPoints),
+        2 if purpose == Purpose::LevelSets && n_points >= LOCAL_CURVES_FROM => Some(AutoReason::FineCurve),
         _ => None,
     }
 }

@@ -29,15 +29,18 @@ impl Recipe {
     pub fn made_at_once(&self) -> Option<Model> {
         match self {
             Self::LocalSurface { .. } => Some(Model::LocalSurface),
-            Self::System { .. } | Self::Landmark { .. } | Self::LocalKriging { .. } => None,
+            Self::System { .. }
+            | Self::Landmark { .. }
+            | Self::Iterative { .. }
+            | Self::LocalKriging { .. } => None,
         }
     }
 
     /// Makes the model ready.
     ///
     /// # Errors
-    /// Returns the errors of [`System::new`], [`Solver::dense_in`] and [`Solver::landmark`], and
-    /// `NumericsError::Cancelled`.
+    /// Returns the errors of [`System::new`], [`Solver::dense_in`], [`Solver::landmark`] and
+    /// [`Solver::iterative_to`], and `NumericsError::Cancelled`.
     pub fn make(self, making: Making<'_>, observer: &dyn Observer) -> Result<Model> {
         let Making { cloud, sampling, workspace } = making;
         match self {
@@ -48,6 +51,10 @@ impl Recipe {
             Self::Landmark { kernel, regularization } => {
                 let system = System::new(cloud, kernel, regularization)?;
                 Ok(Model::System(Arc::new(Solver::landmark(system, observer)?)))
+            }
+            Self::Iterative { kernel, regularization, tolerance } => {
+                let system = System::new(cloud, kernel, regularization)?;
+                Ok(Model::System(Arc::new(Solver::iterative_to(tolerance, system, observer)?)))
             }
             Self::LocalKriging { kernel, regularization } => {
                 let sampling = match sampling {

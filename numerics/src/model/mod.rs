@@ -56,6 +56,7 @@ impl Model {
         match self {
             Self::System(solver) => match solver.method() {
                 Method::Landmark => SolverKind::Landmark,
+                Method::ConjugateGradients => SolverKind::Iterative,
                 Method::Cholesky | Method::PivotedCholesky => SolverKind::Dense,
             },
             Self::LocalKriging(_) | Self::LocalSurface => SolverKind::Local,
@@ -65,13 +66,15 @@ impl Model {
     /// Returns the label of the model in metrics.
     ///
     /// `dense` is a factorization of the whole matrix, `pivoted` one of its pivots, `landmark` one of
-    /// landmarks. `moving` is local kriging, and `local` stands for local regressions.
+    /// landmarks, and `iterative` conjugate gradients. `moving` is local kriging, and `local` stands for
+    /// local regressions.
     pub fn name(&self) -> &'static str {
         match self {
             Self::System(solver) => match solver.method() {
                 Method::Cholesky => "dense",
                 Method::PivotedCholesky => "pivoted",
                 Method::Landmark => "landmark",
+                Method::ConjugateGradients => "iterative",
             },
             Self::LocalKriging(_) => "moving",
             Self::LocalSurface => "local",

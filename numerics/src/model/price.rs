@@ -2,10 +2,12 @@
 
 use super::Recipe;
 use crate::error::SolverKind;
+use crate::function::COLUMNS_AT_ONCE;
 use crate::function::local_kriging::price::{kriged_operator_price, kriging_price, making_price};
 use crate::function::price::{self as functions, deviations_price, judging_price, many_price, samples_price};
 use crate::machine::price::{Price, Sizes};
-use crate::solver::landmark::price::{landmark_fit_flops, landmark_price, on_landmarks};
+use crate::solver::iterative::price::{iterative_covariances_price, iterative_fit_price, iterative_price};
+use crate::solver::landmark::price::{LandmarkPrice, landmark_fit_flops, on_centres, on_landmarks};
 use crate::solver::price::FactorPrice;
 use crate::sums::price::pair_flops;
 use crate::surface::mesh::fields::quadrics::BYTES_PER_POINT;
@@ -43,8 +45,13 @@ impl Recipe {
         match self {
             Self::System { .. } => system_price(n_points, dimension),
             Self::Landmark { .. } => {
-                let price = landmark_price(n_points, dimension);
-                let surface = landmark_surface_price(n_points, dimension);
+                let LandmarkPrice { expected, at_most } = LandmarkPrice::of(n_points, dimension);
+                MakingPrice { expected, at_most, surface: landmark_surface_price(n_points, dimension) }
+            }
+            Self::Iterative { .. } => {
+                let price = iterative_price(n_points, dimension);
+                let surface = signature_surface_price(n_points, dimension)
+                    .and(iterative_fit_price(n_points, dimension));
                 MakingPrice { expected: price, at_most: price, surface }
             }
             Self::LocalKriging { kernel, .. } => {
@@ -107,9 +114,24 @@ pub fn function_price(solver: SolverKind, order: usize, n_deviations: usize, siz
         SolverKind::Dense => functions::function_price(order, sizes).and(of_deviations(n_deviations, sizes)),
         SolverKind::Landmark => {
             let fit = Price::of_numbers(6 * sizes.n_points, landmark_fit_flops(sizes.n_points));
-            fit.and(function_price(SolverKind::Dense, order, n_deviations, on_landmarks(sizes)))
+            fit.and(functions::function_price(order, on_centres(sizes)))
+                .and(of_deviations(n_deviations, on_landmarks(sizes)))
         }
+        SolverKind::Iterative => functions::function_price(order, sizes)
+            .and(iterative_fit_price(sizes.n_points, sizes.dimension))
+            .and(of_covariances(n_deviations, sizes)),
     }
+}
+
+/// The price of k lists of values at once besides the first.
+pub fn lists_price(solver: SolverKind, n_lists: usize, n_derivatives: usize, sizes: Sizes) -> Price {
+    let n_others = n_lists.saturating_sub(1) as f64;
+    let fits = match solver {
+        SolverKind::Dense | SolverKind::Local => 0.0,
+        SolverKind::Landmark => n_others * landmark_fit_flops(sizes.n_points),
+        SolverKind::Iterative => n_others * iterative_fit_price(sizes.n_points, sizes.dimension).flops,
+    };
+    many_price(n_lists, n_derivatives, sizes).and(Price { n_bytes: 0, flops: fits })
 }
 
 /// The price of a posterior at queries.
@@ -123,6 +145,9 @@ pub fn posterior_price(solver: SolverKind, asked: PosteriorAsked, sizes: Sizes) 
         let of_lists = Price::of_numbers(sizes.n_points.saturating_mul(6 * n_lists), fit);
         return of_lists.and(posterior_price(SolverKind::Dense, asked, on_landmarks(sizes)));
     }
+    if solver == SolverKind::Iterative {
+        return iterative_posterior_price(asked, sizes);
+    }
     let mut price = functions::posterior_price(has_variances, has_covariance, sizes);
     if n_lists > 1 {
         price = price.and(many_price(n_lists, asked.n_derivatives, sizes));
@@ -132,6 +157,30 @@ pub fn posterior_price(solver: SolverKind, asked: PosteriorAsked, sizes: Sizes) 
         price = price.and(samples_price(sizes.n_queries, asked.n_samples.saturating_mul(n_lists)));
     }
     price
+}
+
+/// The price of a posterior by conjugate gradients, for which each variance is a solve.
+fn iterative_posterior_price(asked: PosteriorAsked, sizes: Sizes) -> Price {
+    let PosteriorAsked { has_variances, has_covariance, n_lists, n_deviations, n_samples, .. } = asked;
+    let fit = iterative_fit_price(sizes.n_points, sizes.dimension);
+    let n_solved = usize::from(has_variances || has_covariance) + n_deviations;
+    let mut price = functions::function_price(0, sizes)
+        .and(Price { flops: fit.flops * n_lists as f64, ..fit })
+        .and(of_covariances(n_solved, sizes));
+    if has_covariance {
+        let columns = sizes.n_points.saturating_mul(10).saturating_add(sizes.n_queries);
+        price = price.and(Price::of_numbers(columns.saturating_mul(sizes.n_queries), 0.0));
+    }
+    if n_samples > 0 {
+        price = price.and(samples_price(sizes.n_queries, n_samples.saturating_mul(n_lists)));
+    }
+    price
+}
+
+/// The price of the covariances of `per_query` functionals at each query by conjugate gradients.
+fn of_covariances(per_query: usize, sizes: Sizes) -> Price {
+    let n_queries = sizes.n_queries.saturating_mul(per_query);
+    iterative_covariances_price(COLUMNS_AT_ONCE, Sizes { n_queries, ..sizes })
 }
 
 /// The price of the deviations of `per_query` functionals at each query.
@@ -147,7 +196,7 @@ fn of_deviations(per_query: usize, sizes: Sizes) -> Price {
 pub fn geometry_price(surface: SolverKind, asked: AskedOfSurface, sizes: Sizes) -> Price {
     match surface {
         SolverKind::Local => local_geometry_price(sizes),
-        SolverKind::Dense => surfaces::geometry_price(asked, sizes),
+        SolverKind::Dense | SolverKind::Iterative => surfaces::geometry_price(asked, sizes),
         SolverKind::Landmark => surfaces::geometry_price(asked, on_landmarks(sizes)),
     }
 }
@@ -155,7 +204,7 @@ pub fn geometry_price(surface: SolverKind, asked: AskedOfSurface, sizes: Sizes) 
 /// The price of meshing the surface of a model, or a level of its values.
 pub fn level_set_price(solver: SolverKind, size: MeshSize) -> Price {
     match solver {
-        SolverKind::Dense | SolverKind::Landmark => {
+        SolverKind::Dense | SolverKind::Landmark | SolverKind::Iterative => {
             size.price(size.n_points as f64 * pair_flops(size.dimension, 0))
         }
         SolverKind::Local => {
@@ -177,6 +226,15 @@ pub fn operator_price(values: SolverKind, surface: SolverKind, asked: OperatorAs
         SolverKind::Landmark => {
             let fit = Price::of_numbers(6 * sizes.n_points, landmark_fit_flops(sizes.n_points));
             fit.and(operator_price(SolverKind::Dense, surface, asked, on_landmarks(sizes)))
+        }
+        SolverKind::Iterative => {
+            let n_judged = n_numbers.min(JUDGED_FUNCTIONALS);
+            let n_solved = n_judged + if asked.has_deviations { n_numbers } else { 0 };
+            let of_solved = Sizes { n_queries: n_solved, ..sizes };
+            applied_price(n_surface_points, asked.surface, sizes)
+                .and(judging_price(n_judged, sizes))
+                .and(iterative_fit_price(sizes.n_points, sizes.dimension))
+                .and(of_covariances(1, of_solved))
         }
         SolverKind::Dense => {
             let applied = applied_price(n_surface_points, asked.surface, sizes);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::error::{NumericsError, SolverKind};
 use crate::kernel::Kernel;
 use crate::points::cloud::Cloud;
-use crate::solver::System;
+use crate::solver::{DEFAULT_TOLERANCE, System};
 use crate::sums::regularization::Regularization;
 use crate::surface::local::Learning;
 
@@ -16,6 +16,9 @@ pub enum Recipe {
     System { kernel: Kernel, regularization: Regularization },
     /// A single system over all points, solved on landmarks.
     Landmark { kernel: Kernel, regularization: Regularization },
+    /// A single system over all points, solved by conjugate gradients until the relative residual is at most
+    /// `tolerance`.
+    Iterative { kernel: Kernel, regularization: Regularization, tolerance: f64 },
     /// A small system around each query, from its nearest points.
     LocalKriging { kernel: Kernel, regularization: Regularization },
     /// A surface by local regressions, which choose kernel and noise by themselves. They learn all over the
@@ -29,7 +32,29 @@ impl Recipe {
         match solver {
             SolverKind::Dense => Self::System { kernel, regularization },
             SolverKind::Landmark => Self::Landmark { kernel, regularization },
+            SolverKind::Iterative => Self::Iterative { kernel, regularization, tolerance: DEFAULT_TOLERANCE },
             SolverKind::Local => Self::LocalKriging { kernel, regularization },
+        }
+    }
+
+    /// Returns the recipe with another tolerance, if its solver iterates.
+    pub fn with_tolerance(self, tolerance: f64) -> Self {
+        match self {
+            Self::Iterative { kernel, regularization, .. } => {
+                Self::Iterative { kernel, regularization, tolerance }
+            }
+            other => other,
+        }
+    }
+
+    /// Returns the tolerance, if the solver iterates.
+    pub fn tolerance(&self) -> Option<f64> {
+        match self {
+            Self::Iterative { tolerance, .. } => Some(*tolerance),
+            Self::System { .. }
+            | Self::Landmark { .. }
+            | Self::LocalKriging { .. }
+            | Self::LocalSurface { .. } => None,
         }
     }
 
@@ -37,6 +62,7 @@ impl Recipe {
         match self {
             Self::System { .. } => SolverKind::Dense,
             Self::Landmark { .. } => SolverKind::Landmark,
+            Self::Iterative { .. } => SolverKind::Iterative,
             Self::LocalKriging { .. } | Self::LocalSurface { .. } => SolverKind::Local,
         }
     }
@@ -46,6 +72,7 @@ impl Recipe {
         match self {
             Self::System { kernel, regularization }
             | Self::Landmark { kernel, regularization }
+            | Self::Iterative { kernel, regularization, .. }
             | Self::LocalKriging { kernel, regularization } => Some((kernel, regularization)),
             Self::LocalSurface { .. } => None,
         }
@@ -55,7 +82,10 @@ impl Recipe {
     pub fn learning(&self) -> Option<&Learning> {
         match self {
             Self::LocalSurface { learning } => learning.as_ref(),
-            Self::System { .. } | Self::Landmark { .. } | Self::LocalKriging { .. } => None,
+            Self::System { .. }
+            | Self::Landmark { .. }
+            | Self::Iterative { .. }
+            | Self::LocalKriging { .. } => None,
         }
     }
 
@@ -74,7 +104,10 @@ impl Recipe {
             Self::System { kernel, regularization } => {
                 System::new(cloud.clone(), kernel.clone(), regularization.clone()).map(Some)
             }
-            Self::Landmark { .. } | Self::LocalKriging { .. } | Self::LocalSurface { .. } => Ok(None),
+            Self::Landmark { .. }
+            | Self::Iterative { .. }
+            | Self::LocalKriging { .. }
+            | Self::LocalSurface { .. } => Ok(None),
         }
     }
 }

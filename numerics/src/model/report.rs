@@ -22,6 +22,9 @@ pub struct Report {
     /// `|u(X) − Y|₂`, unit V. For local regressions, the distance of the points from the surface.
     pub misfit: Option<f64>,
     pub is_refined: bool,
+    /// Number of iterations, if the solver iterates, and the residual that it was to reach.
+    pub n_iterations: Option<usize>,
+    pub tolerance: Option<f64>,
     pub trend: Option<Trend>,
     /// Disagreement of the values with kernel and noise. Points are those of the fit.
     pub disagreement: Option<Disagreement>,
@@ -45,11 +48,13 @@ impl Report {
             method: Some(solver.method()),
             rank: Some(solver.rank()),
             remaining: solver.remaining_diagonal(),
-            reciprocal_condition: Some(solver.reciprocal_condition()),
+            reciprocal_condition: solver.reciprocal_condition(),
             relative_residual: Some(solution.relative_residual),
             native_norm_squared: Some(solution.native_norm_squared),
             misfit: Some(solution.misfit),
             is_refined: solution.refined,
+            n_iterations: solution.n_iterations,
+            tolerance: solver.tolerance(),
             trend: solution.trend.clone(),
             disagreement: solution.disagreement(solver.n_points(), scale),
             ..Self::default()

@@ -60,6 +60,7 @@ impl Solver {
         let n = system.n_points();
         let is_whole = factor.n_missing() == 0 && factor.factor.n_points() == n && weights_of_one.len() == n;
         let factorization = Factorization::Cholesky(factor.factor);
+        let reciprocal_condition = Some(reciprocal_condition);
         is_whole.then_some(Self { system, factorization, norm1, reciprocal_condition, weights_of_one })
     }
 
@@ -70,9 +71,11 @@ impl Solver {
                 numbers: factor.numbers(),
                 weights_of_one: &self.weights_of_one,
                 norm1: self.norm1,
-                reciprocal_condition: self.reciprocal_condition,
+                reciprocal_condition: self.reciprocal_condition.unwrap_or_default(),
             }),
-            Factorization::PivotedCholesky { .. } | Factorization::Landmark(_) => None,
+            Factorization::PivotedCholesky { .. }
+            | Factorization::Landmark(_)
+            | Factorization::Iterative(_) => None,
         }
     }
 }

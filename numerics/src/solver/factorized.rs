@@ -3,19 +3,16 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use faer::prelude::ReborrowMut;
-use faer::{Mat, MatMut, Par};
+use faer::MatMut;
 
-use super::MAX_INVERSE_DIAGONAL;
 use super::condition::estimate_norm1;
-use super::dense::{Cholesky, PivotedCholesky, pieces};
+use super::dense::{Cholesky, PivotedCholesky};
+use super::iterative::Iterative;
 use super::landmark::Landmarks;
-use super::solution::MAX_RELATIVE_RESIDUAL;
 use super::system::System;
-use crate::error::{NotDefinite, NumericsError, Quantity, Result, SolverKind};
+use crate::error::Result;
 use crate::machine::heap::{arc_payload, block_bytes, vec_bytes};
 use crate::machine::pages::SpareBuffer;
-use crate::machine::vector::dot;
 use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
 
@@ -29,6 +26,8 @@ pub enum Method {
     PivotedCholesky,
     /// Normal equations on landmarks.
     Landmark,
+    /// Conjugate gradients with a sparse factor of the inverse.
+    ConjugateGradients,
 }
 
 /// Source of the memory of a factorization.
@@ -55,8 +54,8 @@ pub struct Solver {
     pub(super) system: System,
     pub(super) factorization: Factorization,
     pub(super) norm1: f64,
-    pub(super) reciprocal_condition: f64,
-    /// Weights of the constant 1, `[n]`. Empty for landmarks.
+    pub(super) reciprocal_condition: Option<f64>,
+    /// Weights of the constant 1, `[n]`. Empty unless the whole matrix is factorized.
     pub(super) weights_of_one: Vec<f64>,
 }
 
@@ -64,6 +63,7 @@ pub(super) enum Factorization {
     Cholesky(Cholesky),
     PivotedCholesky { factor: PivotedCholesky, failed_at: usize, pivots: Arc<Cloud> },
     Landmark(Box<Landmarks>),
+    Iterative(Box<Iterative>),
 }
 
 impl Solver {
@@ -109,7 +109,7 @@ impl Solver {
             |x| factorization.solve_transposed_in_place(x, observer),
         )?;
         let product = norm1 * inverse_norm1;
-        let reciprocal_condition = if product.is_finite() { 1.0 / product.max(1.0) } else { 0.0 };
+        let reciprocal_condition = Some(if product.is_finite() { 1.0 / product.max(1.0) } else { 0.0 });
         Ok(Self { system, factorization, norm1, reciprocal_condition, weights_of_one })
     }
 
@@ -125,9 +125,23 @@ impl Solver {
         let landmarks = Landmarks::of(&system, observer)?;
         observer.enter(Stage::Condition);
         let norm1 = system.largest_row_seen(observer)?;
-        let reciprocal_condition = landmarks.reciprocal_condition();
+        let reciprocal_condition = Some(landmarks.reciprocal_condition());
         let factorization = Factorization::Landmark(Box::new(landmarks));
         Ok(Self { system, factorization, norm1, reciprocal_condition, weights_of_one: Vec::new() })
+    }
+
+    /// Prepares conjugate gradients, which solve for values until the relative residual is at most
+    /// `tolerance`.
+    ///
+    /// It takes 512 n bytes. Values take about ten passes over all pairs of points.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub fn iterative_to(tolerance: f64, system: System, observer: &dyn Observer) -> Result<Self> {
+        let iterative = Iterative::of(&system, tolerance, observer)?;
+        let norm1 = system.largest_row_seen(observer)?;
+        let factorization = Factorization::Iterative(Box::new(iterative));
+        Ok(Self { system, factorization, norm1, reciprocal_condition: None, weights_of_one: Vec::new() })
     }
 
     pub fn system(&self) -> &System {
@@ -140,25 +154,27 @@ impl Solver {
             Factorization::Cholesky(_) => Method::Cholesky,
             Factorization::PivotedCholesky { .. } => Method::PivotedCholesky,
             Factorization::Landmark(_) => Method::Landmark,
+            Factorization::Iterative(_) => Method::ConjugateGradients,
         }
     }
 
     /// Numerical rank: n, or the number of pivots of the fallback, or of landmarks.
     pub fn rank(&self) -> usize {
         match &self.factorization {
-            Factorization::Cholesky(_) => self.system.n_points(),
+            Factorization::Cholesky(_) | Factorization::Iterative(_) => self.system.n_points(),
             Factorization::PivotedCholesky { factor, .. } => factor.pivots().len(),
             Factorization::Landmark(landmarks) => landmarks.rank(),
         }
     }
 
     /// `1/(‖K + αI‖₁ ‖W‖₁)` where W maps values to weights, estimated (Higham 2002, alg. 15.1). For
-    /// landmarks, that of their normal equations.
-    pub fn reciprocal_condition(&self) -> f64 {
+    /// landmarks, that of their normal equations. `None` for conjugate gradients, which have no W.
+    pub fn reciprocal_condition(&self) -> Option<f64> {
         self.reciprocal_condition
     }
 
-    /// `W·1`, `[n]`: the weights of the signature function. Only factorizations of the whole matrix keep them.
+    /// `W·1`, `[n]`: the weights of the signature function. Only factorizations of the whole matrix keep
+    /// them.
     ///
     /// # Errors
     /// Returns the errors of [`Solver::solve_in_place`].
@@ -172,7 +188,7 @@ impl Solver {
         Ok(Cow::Owned(weights))
     }
 
-    /// `‖K + αI‖₁`; for landmarks, the largest of some columns.
+    /// `‖K + αI‖₁`; without its factor, the largest of some columns.
     pub(crate) fn norm1(&self) -> f64 {
         self.norm1
     }
@@ -180,7 +196,7 @@ impl Solver {
     /// Returns the points with weights, and their indices in X if these are not all points.
     pub(super) fn centres(&self) -> (&Cloud, Option<&[usize]>) {
         match &self.factorization {
-            Factorization::Cholesky(_) => (self.system.cloud(), None),
+            Factorization::Cholesky(_) | Factorization::Iterative(_) => (self.system.cloud(), None),
             Factorization::PivotedCholesky { factor, pivots, .. } => (pivots, Some(factor.pivots())),
             Factorization::Landmark(landmarks) => (landmarks.cloud(), Some(landmarks.points())),
         }
@@ -194,6 +210,7 @@ impl Solver {
                 factor.n_bytes() + block_bytes(arc_payload::<Cloud>()) + pivots.n_bytes()
             }
             Factorization::Landmark(landmarks) => landmarks.n_bytes(),
+            Factorization::Iterative(iterative) => iterative.n_bytes(),
         };
         factor + vec_bytes(&self.weights_of_one) + self.system.n_bytes()
     }
@@ -221,65 +238,29 @@ impl Solver {
         self.factorization.solve_transposed_in_place(functionals, observer)
     }
 
-    /// The points whose covariances with a functional say what the values know of it.
-    pub(crate) fn known_points(&self) -> &Cloud {
-        match &self.factorization {
-            Factorization::Landmark(landmarks) => landmarks.cloud(),
-            Factorization::Cholesky(_) | Factorization::PivotedCholesky { .. } => self.system.cloud(),
-        }
-    }
-
-    /// Whitens covariances with the [`Solver::known_points`], one column for each functional: `L⁻¹` times
-    /// them, `LLᵀ = K + αI`, or what stands for it. [`Whitened::explained`] is then the covariance that the
-    /// values explain.
-    ///
-    /// # Errors
-    /// [`NumericsError::NotPositiveDefinite`] where the matrix has no such factor in float64;
-    /// [`NumericsError::Cancelled`].
-    pub(crate) fn whitened(&self, covariances: Vec<f64>, observer: &dyn Observer) -> Result<Whitened> {
-        if let Factorization::Landmark(landmarks) = &self.factorization {
-            let (n_rows, n_explaining) = (2 * landmarks.rank(), landmarks.rank());
-            return Ok(Whitened { columns: landmarks.whitened(&covariances), n_rows, n_explaining });
-        }
-        let n = self.system.n_points();
-        let mut columns = covariances;
-        let count = columns.len() / n;
-        self.whiten_in_place(MatMut::from_column_major_slice_mut(&mut columns, n, count), observer)?;
-        Ok(Whitened { columns, n_rows: n, n_explaining: n })
-    }
-
-    /// Whitens values `[n, k]` in the same way, such that [`Whitened::explained`] of them and covariances is
-    /// what their fit predicts.
-    ///
-    /// # Errors
-    /// Returns the errors of [`Solver::whitened`].
-    pub(crate) fn whitened_values(&self, values: Vec<f64>, observer: &dyn Observer) -> Result<Whitened> {
-        match &self.factorization {
-            Factorization::Landmark(landmarks) => {
-                let (n_rows, n_explaining) = (2 * landmarks.rank(), landmarks.rank());
-                let columns = landmarks.whitened_values(&values, observer)?;
-                Ok(Whitened { columns, n_rows, n_explaining })
-            }
-            Factorization::Cholesky(_) | Factorization::PivotedCholesky { .. } => {
-                self.whitened(values, observer)
-            }
-        }
-    }
-
-    /// Magnitude of a negative variance up to which it is rounding, if that does not depend on the query.
-    pub(crate) fn rounding_of_variances(&self) -> Option<f64> {
-        match &self.factorization {
-            Factorization::Landmark(landmarks) => Some(landmarks.remaining().max(landmarks.tolerance())),
-            Factorization::Cholesky(_) | Factorization::PivotedCholesky { .. } => None,
-        }
-    }
-
     /// The landmarks, if the system is solved on them.
     pub(super) fn landmarks(&self) -> Option<&Landmarks> {
         match &self.factorization {
             Factorization::Landmark(landmarks) => Some(landmarks),
-            Factorization::Cholesky(_) | Factorization::PivotedCholesky { .. } => None,
+            Factorization::Cholesky(_)
+            | Factorization::PivotedCholesky { .. }
+            | Factorization::Iterative(_) => None,
         }
+    }
+
+    /// The conjugate gradients, if the system is solved by them.
+    pub(super) fn iterative(&self) -> Option<&Iterative> {
+        match &self.factorization {
+            Factorization::Iterative(iterative) => Some(iterative),
+            Factorization::Cholesky(_)
+            | Factorization::PivotedCholesky { .. }
+            | Factorization::Landmark(_) => None,
+        }
+    }
+
+    /// Largest relative residual of an answer by conjugate gradients.
+    pub fn tolerance(&self) -> Option<f64> {
+        self.iterative().map(Iterative::tolerance)
     }
 
     /// What remains of the diagonal beside landmarks, and what was to remain at most, V².
@@ -289,91 +270,6 @@ impl Solver {
             tolerance: landmarks.tolerance(),
         };
         self.landmarks().map(of)
-    }
-
-    /// Overwrites the columns of `[n, k]` by `L⁻¹` times them, `LLᵀ = K + αI`.
-    ///
-    /// # Errors
-    /// [`NumericsError::NotPositiveDefinite`] where the matrix has no such factor in float64;
-    /// [`NumericsError::Cancelled`].
-    pub(crate) fn whiten_in_place(
-        &self,
-        mut columns: MatMut<'_, f64>,
-        observer: &dyn Observer,
-    ) -> Result<()> {
-        let (n, cholesky) = (self.system.n_points(), self.cholesky()?);
-        for (first, count) in pieces(columns.ncols(), (n * n) as f64) {
-            observer.checkpoint()?;
-            cholesky.whiten_in_place(columns.rb_mut().subcols_mut(first, count));
-        }
-        Ok(())
-    }
-
-    /// The diagonal of `(K + αI)⁻¹`, `[n]`.
-    ///
-    /// # Errors
-    /// Returns [`NumericsError::Unsupported`] for more than [`MAX_INVERSE_DIAGONAL`] points, and the errors
-    /// of [`Solver::whiten_in_place`].
-    pub(crate) fn inverse_diagonal(&self) -> Result<Vec<f64>> {
-        let n = self.system.n_points();
-        if n > MAX_INVERSE_DIAGONAL {
-            let solver = SolverKind::Dense;
-            return Err(NumericsError::Unsupported { solver, quantity: Quantity::InverseDiagonal });
-        }
-        let mut inverse = Mat::<f64>::identity(n, n);
-        // On one thread: the caller is one of many tasks, and a thread that waits would begin another task of
-        // that kind.
-        self.cholesky()?.whiten_with(inverse.as_mut(), Par::Seq);
-        Ok((0..n).map(|i| inverse.col(i).squared_norm_l2()).collect())
-    }
-
-    /// `ln det(K + αI)`.
-    ///
-    /// # Errors
-    /// Returns the errors of [`Solver::whiten_in_place`].
-    pub(crate) fn log_determinant(&self) -> Result<f64> {
-        match &self.factorization {
-            Factorization::Landmark(landmarks) => Ok(landmarks.log_determinant()),
-            Factorization::Cholesky(_) | Factorization::PivotedCholesky { .. } => {
-                Ok(self.cholesky()?.log_determinant())
-            }
-        }
-    }
-
-    /// Returns the Cholesky factor, unless the matrix is singular to rounding. A factor of such a matrix
-    /// exists by luck. It still solves smooth right-hand sides, but its variances and determinants are off by
-    /// tens of percent.
-    fn cholesky(&self) -> Result<&Cholesky> {
-        match &self.factorization {
-            Factorization::Cholesky(_) if self.reciprocal_condition < f64::EPSILON => {
-                let reciprocal_condition = self.reciprocal_condition;
-                Err(self.not_positive_definite(NotDefinite::Singular { reciprocal_condition }))
-            }
-            Factorization::Cholesky(factor) => Ok(factor),
-            Factorization::PivotedCholesky { failed_at, .. } => {
-                Err(self.not_positive_definite(NotDefinite::NeedsCholesky { point: *failed_at }))
-            }
-            Factorization::Landmark(_) => {
-                let (solver, quantity) = (SolverKind::Landmark, Quantity::InverseDiagonal);
-                Err(NumericsError::Unsupported { solver, quantity })
-            }
-        }
-    }
-
-    /// Returns the refusal with its remedy: an α that is large enough.
-    pub(crate) fn not_positive_definite(&self, reason: NotDefinite) -> NumericsError {
-        let multiple = match reason {
-            NotDefinite::Residual { .. } => (self.system.n_points() as f64).max(1.0 / MAX_RELATIVE_RESIDUAL),
-            NotDefinite::BackwardError { .. }
-            | NotDefinite::NeedsCholesky { .. }
-            | NotDefinite::Unfactorable
-            | NotDefinite::Singular { .. }
-            | NotDefinite::NegativeVariance { .. } => self.system.n_points() as f64,
-        };
-        NumericsError::NotPositiveDefinite {
-            reason,
-            minimum_alpha: 4.0 * multiple * f64::EPSILON * self.norm1,
-        }
     }
 }
 
@@ -386,35 +282,13 @@ pub struct Remaining {
     pub tolerance: f64,
 }
 
-/// Whitened columns.
-///
-/// The first rows of a column count as explained, the others as not: the products of the latter are
-/// subtracted.
-pub(crate) struct Whitened {
-    pub(crate) columns: Vec<f64>,
-    pub(crate) n_rows: usize,
-    pub(crate) n_explaining: usize,
-}
-
-impl Whitened {
-    /// The columns, one for each functional.
-    pub(crate) fn iter(&self) -> std::slice::ChunksExact<'_, f64> {
-        self.columns.chunks_exact(self.n_rows)
-    }
-
-    /// The covariance of two functionals that the values explain, from their columns.
-    pub(crate) fn explained(&self, a: &[f64], b: &[f64]) -> f64 {
-        let (n, own) = (self.n_explaining, |x: &[f64], y: &[f64]| dot(x, y));
-        own(&a[..n], &b[..n]) - own(&a[n..], &b[n..])
-    }
-}
-
 impl Factorization {
     fn solve_in_place(&self, values: MatMut<'_, f64>, observer: &dyn Observer) -> Result<()> {
         match self {
             Self::Cholesky(factor) => factor.solve_in_place(values),
             Self::PivotedCholesky { factor, .. } => factor.solve_in_place(values),
             Self::Landmark(landmarks) => landmarks.solve_in_place(values, observer)?,
+            Self::Iterative(iterative) => iterative.solve_in_place(values, observer)?,
         }
         Ok(())
     }
@@ -424,6 +298,7 @@ impl Factorization {
             Self::Cholesky(factor) => factor.solve_in_place(functionals),
             Self::PivotedCholesky { factor, .. } => factor.solve_transposed_in_place(functionals),
             Self::Landmark(landmarks) => landmarks.solve_transposed_in_place(functionals, observer)?,
+            Self::Iterative(iterative) => iterative.solve_in_place(functionals, observer)?,
         }
         Ok(())
     }

@@ -5,14 +5,16 @@ pub mod system;
 pub mod trend;
 
 mod condition;
+mod conjugate_gradients;
 mod dense;
 mod factor;
 mod factorized;
+pub(crate) mod iterative;
 pub(crate) mod landmark;
-mod many;
-mod residuals;
 mod solution;
+mod whitening;
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use super::error::Result;
@@ -25,12 +27,19 @@ use super::sums::regularization::Regularization;
 pub(crate) use condition::estimate_norm1;
 pub(crate) use dense::{PIVOT_TOLERANCE, factorize_in_place};
 pub use factor::{Factor, FactorBuilder};
+pub(crate) use factorized::SMALLEST_PIVOT;
 pub use factorized::{Method, Remaining, Solver, Workspace};
-pub(crate) use factorized::{SMALLEST_PIVOT, Whitened};
-pub use residuals::{Disagreement, Outlier, Place};
+pub use landmark::expected_landmarks;
 pub(crate) use solution::MAX_RELATIVE_RESIDUAL;
-pub use solution::Solution;
+pub use solution::{Disagreement, Outlier, Place, Solution};
 pub use system::System;
+pub(crate) use whitening::Whitened;
+
+/// Largest relative residual of an answer by conjugate gradients, unless a request has another.
+pub const DEFAULT_TOLERANCE: f64 = 1e-8;
+
+/// Range of tolerances: rounding below it, and no honest answer above.
+pub const TOLERANCES: RangeInclusive<f64> = 1e-14..=MAX_RELATIVE_RESIDUAL;
 
 /// Number of points up to which the diagonal of the inverse is computed. It costs three factorizations.
 pub(crate) const MAX_INVERSE_DIAGONAL: usize = 512;
@@ -61,17 +70,22 @@ impl Solver {
         self.system().n_points()
     }
 
-    /// Returns the function with given weights, one for each of its centres.
+    /// Returns the function with given weights, one for each point, or one for each of the few centres of a
+    /// solver that has some.
     pub(crate) fn expansion<'a>(&'a self, weights: &'a [f64]) -> Expansion<'a> {
         let (centres, _) = self.centres();
+        let centres = if weights.len() == self.n_points() { self.cloud() } else { centres };
         Expansion { centres, kernel: self.kernel(), weights }
     }
 
-    /// Restricts weights at all points, `[n]`, to weights of the centres, `[r]`.
+    /// Restricts weights at all points, `[n]`, to weights of the centres, `[r]`, where the others are 0.
     fn at_centres(&self, weights: &[f64]) -> Vec<f64> {
-        match self.centres() {
-            (_, None) => weights.to_vec(),
-            (_, Some(points)) => points.iter().map(|&point| weights[point]).collect(),
+        match self.method() {
+            Method::PivotedCholesky => match self.centres() {
+                (_, None) => weights.to_vec(),
+                (_, Some(points)) => points.iter().map(|&point| weights[point]).collect(),
+            },
+            Method::Cholesky | Method::Landmark | Method::ConjugateGradients => weights.to_vec(),
         }
     }
 }

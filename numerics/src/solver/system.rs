@@ -9,10 +9,16 @@ use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::points::duplicates::coinciding_points;
 use crate::sums::expansion::Expansion;
+use crate::sums::many::values_of_each;
 use crate::sums::regularization::Regularization;
+use crate::sums::symmetric::kernel_times;
 
 /// Columns of which [`System::largest_row_seen`] is the largest.
 const ROWS_SEEN: usize = 64;
+
+/// Columns up to which products with each by itself, for which each pair of points is evaluated once, are
+/// faster than products with all.
+const FEW: usize = 2;
 
 /// The linear system of a fit, `(K(X, X) + αI) Λ = Y` for any values Y. Its constructor checks that a
 /// solution can exist.
@@ -81,6 +87,23 @@ impl System {
             .values_at(&places, observer)?;
         let with_noise = sums.iter().zip(&some).map(|(sum, &point)| sum + self.regularization.at(point));
         Ok(with_noise.fold(0.0, f64::max))
+    }
+
+    /// `(K + αI)X` for columns `[n, k]`.
+    ///
+    /// # Errors
+    /// [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
+    pub(super) fn times(&self, columns: &[f64], observer: &dyn Observer) -> Result<Vec<f64>> {
+        let (n, cloud, kernel) = (self.n_points(), &*self.cloud, &self.kernel);
+        let mut products = if columns.len() <= FEW * n {
+            let each = columns.chunks_exact(n).map(|column| kernel_times(cloud, kernel, column, observer));
+            each.collect::<Result<Vec<_>>>()?.concat()
+        } else {
+            values_of_each(cloud, kernel, columns, cloud, observer)?
+        };
+        let entries = products.iter_mut().zip(columns).enumerate();
+        entries.for_each(|(at, (product, x))| *product += self.regularization.at(at % n) * x);
+        Ok(products)
     }
 
     pub fn n_points(&self) -> usize {

@@ -7,4 +7,5 @@ pub(crate) mod many;
 pub mod nodes;
 pub(crate) mod price;
 pub mod regularization;
+pub(crate) mod side_by_side;
 pub(crate) mod symmetric;

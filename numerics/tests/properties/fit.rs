@@ -46,7 +46,7 @@ fn without_regularization_the_fit_interpolates() {
             let solved = cloud.n_points() as f64 * EPS * kernel.at_zero() * absolute_sum(&u.solution.weights);
             let left_out = match factor.method() {
                 Method::Cholesky => 0.0,
-                Method::PivotedCholesky | Method::Landmark => {
+                Method::PivotedCholesky | Method::Landmark | Method::ConjugateGradients => {
                     (64.0 * EPS * kernel.at_zero() * u.solution.native_norm_squared).sqrt()
                 }
             };

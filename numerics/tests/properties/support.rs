@@ -68,7 +68,7 @@ pub fn forward_solve(l: &[f64], b: &[f64]) -> Vec<f64> {
 
 /// `n ε cond(K + αI)`: the relative rounding error that a solve may leave in the weights.
 pub fn rounding(factor: &Solver) -> f64 {
-    factor.n_points() as f64 * EPS / factor.reciprocal_condition()
+    factor.n_points() as f64 * EPS / factor.reciprocal_condition().unwrap()
 }
 
 /// The cloud moved by h along one axis.

@@ -17,6 +17,9 @@ pub enum SolverChoice {
     /// Weights at a few hundred to a few thousand of the points, whose kernels span those of all others: for
     /// smooth kernels and up to millions of points.
     Landmark,
+    /// Conjugate gradients on the full system, until the residual is within the tolerance: for rough kernels
+    /// and up to a hundred thousand points.
+    Iterative,
     /// Uses only the points nearest to each query: kriging for values, regressions for surfaces. For
     /// thousands to millions of points.
     Local,

@@ -27,15 +27,13 @@ pub enum FactorizationUsed {
     PartialPivotingLu,
     /// Cholesky of the normal equations of landmarks.
     Landmark,
-    /// Reserved for iterative solvers.
+    /// Conjugate gradients, preconditioned by a sparse factor of the inverse.
     ConjugateGradients,
     /// None. Small systems of the points nearest to each query are solved instead.
     Local,
 }
 
 /// The solver that was used.
-///
-/// `iterative` is reserved: no answer has it yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SolverUsed {
@@ -43,7 +41,7 @@ pub enum SolverUsed {
     Dense,
     /// Weights at a few of the points, whose kernels span those of all others.
     Landmark,
-    /// Reserved for preconditioned conjugate gradients.
+    /// Conjugate gradients on the full system.
     Iterative,
     /// Small systems of the points nearest to each query.
     Local,
@@ -54,6 +52,7 @@ impl From<SolverKind> for SolverUsed {
         match kind {
             SolverKind::Dense => Self::Dense,
             SolverKind::Landmark => Self::Landmark,
+            SolverKind::Iterative => Self::Iterative,
             SolverKind::Local => Self::Local,
         }
     }
@@ -140,10 +139,13 @@ pub struct Diagnostics {
     /// `landmark`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub remaining_diagonal: Option<f64>,
-    /// What the landmarks were to leave of the diagonal at most: a millionth of the noise or less. Only with
-    /// the solver `landmark`.
+    /// With the solver `landmark`, what was to be left of the diagonal at most: a millionth of the noise or
+    /// less. With `iterative`, the largest relative residual that was allowed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
+    /// Number of iterations. Only with the solver `iterative`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub iterations: Option<usize>,
     /// Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): roughly the fraction of digits that survive. For landmarks,
     /// that of their normal equations.
     #[serde(skip_serializing_if = "Option::is_none")]

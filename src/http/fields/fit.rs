@@ -51,6 +51,7 @@ pub struct Fit {
     pub alpha: Option<f64>,
     pub noise_variances: Option<Vec<f64>>,
     pub solver: SolverChoice,
+    pub tolerance: Option<f64>,
     pub duplicates: DuplicatePolicy,
     pub mean: Option<MeanChoice>,
     /// Sites at which local regressions learn, if the client gives them.
@@ -94,6 +95,9 @@ macro_rules! request {
             pub noise_variances: Option<Vec<f64>>,
             /// The method that solves the linear system.
             pub solver: Option<$crate::http::fields::SolverChoice>,
+            /// The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+            #[schema(minimum = 1e-14, maximum = 1e-5)]
+            pub tolerance: Option<f64>,
             /// The treatment of points that coincide when alpha is 0.
             pub duplicates: Option<$crate::http::fields::DuplicatePolicy>,
             $($(#[$field_meta])* pub $field: $type,)*
@@ -123,6 +127,7 @@ macro_rules! request {
                     alpha: self.alpha,
                     noise_variances: self.noise_variances.take(),
                     solver: self.solver.unwrap_or_default(),
+                    tolerance: self.tolerance,
                     duplicates: self.duplicates.unwrap_or_default(),
                     mean: None,
                     sites: None,

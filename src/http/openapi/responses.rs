@@ -33,7 +33,7 @@ problem_set! {
     MalformedRequest, MalformedJson, MalformedBody, Unauthorized, RateLimited, UnknownCloud, NotAcceptable, RequestTimeout, BodyTooLarge,
     ProblemTooLarge,
     UnsupportedMediaType, InvalidRequest, InvalidCloud, DuplicatePoints, DimensionMismatch, LengthMismatch,
-    KernelNotSmooth, KernelNotPositiveDefinite, NotPositiveDefinite, UnsupportedBySolver, Internal, Overloaded,
+    KernelNotSmooth, KernelNotPositiveDefinite, NotPositiveDefinite, NotConverged, UnsupportedBySolver, Internal, Overloaded,
     DeadlineExceeded
 }
 
@@ -70,7 +70,7 @@ problem_set! {
     JobResultProblems:
     MalformedRequest, MalformedJson, MalformedBody, Unauthorized, RateLimited, UnknownCloud, UnknownJob, NotFound, NotAcceptable,
     BodyTooLarge, ProblemTooLarge, UnsupportedMediaType, InvalidRequest, InvalidCloud, DuplicatePoints, DimensionMismatch,
-    LengthMismatch, KernelNotSmooth, KernelNotPositiveDefinite, NotPositiveDefinite, UnsupportedBySolver, Internal, Overloaded,
+    LengthMismatch, KernelNotSmooth, KernelNotPositiveDefinite, NotPositiveDefinite, NotConverged, UnsupportedBySolver, Internal, Overloaded,
     DeadlineExceeded
 }
 

@@ -254,25 +254,20 @@ impl Problem {
             }
             E::DuplicatePoints { points } => Self::duplicates(points, &detail, pointers),
             E::NotPositiveDefinite { reason, minimum_alpha } => {
-                // Rounded up, so that the remedy works when it is typed in.
-                let enough = 1.01 * minimum_alpha;
-                let remedy = format!("{detail}; set alpha to {enough:.2e} or more, or use a rougher kernel");
-                let mut problem = Self::of_field(Slug::NotPositiveDefinite, pointers.regularization, remedy);
-                problem.members.minimum_alpha = Some(minimum_alpha).filter(|alpha| alpha.is_finite());
-                if let NotDefinite::NeedsCholesky { point } = reason {
-                    problem.members.point_indices = vec![point];
-                }
-                problem
+                Self::not_positive_definite(reason, minimum_alpha, &detail, pointers)
             }
             E::OpenSurface { .. } => at(Slug::InvalidRequest, "/open"),
             E::TooManyNodes { .. } => at(Slug::InvalidRequest, "/step"),
             E::Unsupported { .. } => at(Slug::UnsupportedBySolver, "/solver"),
             E::RankTooLarge { .. } => {
-                let remedy = format!(
-                    "{detail}; take a smoother kernel or a longer length scale, set a larger alpha, or set \"solver\" to \
-                     \"dense\" or \"local\""
-                );
-                Self::of_field(Slug::UnsupportedBySolver, "/solver", remedy)
+                let remedy = "take a smoother kernel or a longer length scale, set a larger alpha, or set \"solver\" to \
+                              \"iterative\", \"dense\" or \"local\"";
+                at(Slug::UnsupportedBySolver, "/solver").with_remedy(remedy)
+            }
+            E::NotConverged { .. } => {
+                let remedy = "set a larger tolerance or alpha, take a rougher kernel or a shorter length scale, or set \
+                              \"solver\" to \"landmark\" or \"dense\"";
+                at(Slug::NotConverged, "/tolerance").with_remedy(remedy)
             }
             E::Overflow { .. } => {
                 Self::new(Slug::InvalidRequest, format!("{detail}; scale the values or the length scale"))
@@ -287,6 +282,24 @@ impl Problem {
             // The client that cancelled is gone and reads no answer. The deadline has an answer of its own.
             E::Cancelled => Self::new(Slug::DeadlineExceeded, detail),
         }
+    }
+
+    /// The refusal of a matrix without a factor, with the alpha that would be enough.
+    fn not_positive_definite(
+        reason: NotDefinite,
+        minimum_alpha: f64,
+        detail: &str,
+        pointers: Pointers,
+    ) -> Self {
+        // Rounded up, so that the remedy works when it is typed in.
+        let enough = 1.01 * minimum_alpha;
+        let remedy = format!("{detail}; set alpha to {enough:.2e} or more, or use a rougher kernel");
+        let mut problem = Self::of_field(Slug::NotPositiveDefinite, pointers.regularization, remedy);
+        problem.members.minimum_alpha = Some(minimum_alpha).filter(|alpha| alpha.is_finite());
+        if let NotDefinite::NeedsCholesky { point } = reason {
+            problem.members.point_indices = vec![point];
+        }
+        problem
     }
 
     fn duplicates(points: Vec<usize>, detail: &str, pointers: Pointers) -> Self {

@@ -71,10 +71,14 @@ catalogue! {
     NotPositiveDefinite "not-positive-definite" UNPROCESSABLE_ENTITY "The Gram matrix is not positive definite in float64"
         "The kernel is too smooth or too wide for this cloud at this alpha: no honest answer exists in float64. Set \
         alpha to minimum_alpha or more, shorten the length_scale, or use a rougher kernel.";
+    NotConverged "not-converged" UNPROCESSABLE_ENTITY "The iteration ended above the tolerance"
+        "The solver iterative found no weights whose relative residual is within the tolerance; the detail has the one \
+        that it reached. Set a larger tolerance or alpha, take a rougher kernel or a shorter length_scale, or take \
+        another solver.";
     UnsupportedBySolver "unsupported-by-solver" UNPROCESSABLE_ENTITY "The solver does not serve what was asked for"
         "The local solver answers each query from the points nearest to it: values and their variances, and the geometry \
         of surfaces in dimensions 2 to 4, for which it chooses kernel and noise by itself. Covariance, likelihood and matrices \
-        need the dense solver. The detail names what to leave out, or which solver to take.";
+        need the dense solver, or landmarks; the iterative solver has covariances too. The detail names what to leave out, or which solver to take.";
     UnknownCloud "unknown-cloud" NOT_FOUND "No such cloud"
         "The cloud was never posted with this key, was deleted, or was dropped as the least recently used. Post its \
         points again: the id stays the same.";

@@ -1,5 +1,6 @@
 //! A registered cloud: its points, what is known of their positions, and where it is kept.
 
+use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 
@@ -26,7 +27,12 @@ pub struct RegisteredCloud {
     record: Mutex<Record>,
     pub(super) sampling: OnceLock<Arc<Sampling>>,
     pub(super) noise: OnceLock<f64>,
+    /// How many landmarks kernels were seen to need, if these are few, by the key of kernel and noise.
+    landmarks: Mutex<HashMap<[u8; 32], Option<usize>>>,
 }
+
+/// Largest number of kernels whose landmarks are remembered.
+const MOST_KERNELS: usize = 64;
 
 /// Time of registration, and where the cloud is kept.
 #[derive(Clone, Copy)]
@@ -63,6 +69,7 @@ impl RegisteredCloud {
             record: Mutex::new(record),
             sampling: OnceLock::new(),
             noise: OnceLock::new(),
+            landmarks: Mutex::default(),
         }
     }
 
@@ -79,7 +86,35 @@ impl RegisteredCloud {
             record: Mutex::new(Record { created_at: head.created_at, standing }),
             sampling: OnceLock::new(),
             noise: OnceLock::new(),
+            landmarks: Mutex::default(),
         }
+    }
+
+    /// Returns how many landmarks a kernel needs, if these are few, from memory or by a look. Requests that
+    /// come at once look for themselves, which takes less than to wait for each other.
+    ///
+    /// # Errors
+    /// Returns the errors of the look.
+    pub fn landmarks<E>(
+        &self,
+        key: [u8; 32],
+        look: impl FnOnce(&Cloud) -> Result<Option<usize>, E>,
+    ) -> Result<Option<usize>, E> {
+        if let Some(known) = self.lock_landmarks().get(&key) {
+            return Ok(*known);
+        }
+        let found = look(&self.cloud)?;
+        let mut known = self.lock_landmarks();
+        if known.len() >= MOST_KERNELS {
+            known.clear();
+        }
+        known.insert(key, found);
+        Ok(found)
+    }
+
+    #[expect(clippy::disallowed_methods, reason = "a look-up or an insertion")]
+    fn lock_landmarks(&self) -> MutexGuard<'_, HashMap<[u8; 32], Option<usize>>> {
+        self.landmarks.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Returns its entry in the list of clouds.

@@ -1,8 +1,9 @@
 //! Batches: the neighbourhoods of several queries side by side, one in each lane.
 
-use super::parts::{COLUMNS, Parts};
+use super::parts::Parts;
 use super::quantities::Sized;
 use crate::kernel::Kernel;
+use crate::machine::lanes::COLUMNS;
 use crate::machine::small::{Small, zeros};
 use crate::points::neighbours::{Neighbour, on_grid};
 use crate::solver::System;

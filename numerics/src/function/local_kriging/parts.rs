@@ -2,9 +2,6 @@
 
 use crate::machine::lanes::triangle;
 
-/// Columns solved for at once. With as many rows they make 16 independent chains of products.
-pub(super) const COLUMNS: usize = 4;
-
 /// Rows of any query below the triangle: values, and covariances of the value at the query.
 ///
 /// The rows of quantities and of functions of a mean follow, then those that are not solved for.

@@ -4,8 +4,12 @@ use std::ops::Range;
 
 use pulp::Simd;
 
-use super::Lower;
+use super::{Lower, MAX_LANES};
 use crate::machine::registers::Pack;
+
+/// Columns of large systems that are solved for at once. With as many rows they make 16 independent chains of
+/// products.
+pub(crate) const COLUMNS: usize = 4;
 
 /// Rules by which the entries of a factor are rounded.
 pub(crate) trait Rounding<S: Simd> {
@@ -21,6 +25,16 @@ pub(crate) trait Rounding<S: Simd> {
 }
 
 impl<S: Simd> Lower<'_, S> {
+    /// Factorizes large systems, by [`COLUMNS`] and with as many rows at once as there are registers for.
+    #[inline(always)]
+    pub(crate) fn factorize_wide(&mut self, below: Range<usize>, rounding: &impl Rounding<S>) {
+        if S::F64_LANES == MAX_LANES {
+            self.factorize::<4, COLUMNS>(below, rounding);
+        } else {
+            self.factorize::<2, COLUMNS>(below, rounding);
+        }
+    }
+
     /// Factorizes K = LLᵀ, left-looking, and multiplies the rows `below` by L⁻ᵀ.
     ///
     /// A tile has `ROWS` rows and `COLUMNS` columns, hence as many chains of products that do not wait for

@@ -8,7 +8,7 @@ mod factor;
 mod lower;
 mod workspace;
 
-pub(crate) use factor::Rounding;
+pub(crate) use factor::{COLUMNS, Rounding};
 pub(crate) use lower::{Layout, Lower};
 pub(crate) use workspace::Workspace;
 

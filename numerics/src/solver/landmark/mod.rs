@@ -31,6 +31,7 @@
 mod normal;
 mod pivots;
 pub(crate) mod price;
+mod probe;
 mod residual;
 mod rows;
 
@@ -42,6 +43,7 @@ use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_uppe
 use faer::{Accum, Mat, MatMut, MatRef};
 
 use super::condition::estimate_norm1;
+use super::conjugate_gradients::Preconditioned;
 use super::system::System;
 use crate::error::Result;
 use crate::machine::heap::vec_bytes;
@@ -49,10 +51,15 @@ use crate::machine::parallelism::parallelism;
 use crate::machine::vector::dot;
 use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
+use crate::sums::expansion::Expansion;
 use normal::NormalEquations;
 use pivots::Chosen;
+pub use probe::expected_landmarks;
 pub(super) use residual::TrueResidual;
 use rows::{Coordinates, Rows};
+
+/// Number of points up to which the true system is solved too. A product with its matrix takes n² pairs.
+pub(super) const MOST_PRECONDITIONED: usize = 100_000;
 
 /// Rounds in which pivots are completed from what remains of the diagonal over all points.
 const ROUNDS: usize = 2;
@@ -74,10 +81,20 @@ pub struct Landmarks {
     rows: Rows,
     /// L_B, lower, `[r, r]`.
     inner: Mat<f64>,
+    /// The right-hand side of the constant 1, `[r]`.
+    of_one: Vec<f64>,
     weighing: Weighing,
     tolerance: f64,
     remaining: f64,
     log_determinant: f64,
+}
+
+/// A step of iterative refinement.
+struct Refinement {
+    /// The step, `[r]`.
+    correction: Vec<f64>,
+    /// `Y − Fβ` before it, `[n]`.
+    rest: Vec<f64>,
 }
 
 /// What the landmarks make of some values.
@@ -118,7 +135,7 @@ impl Landmarks {
             chosen = chosen.completed(system, &normal.beyond, observer)?;
             normal = NormalEquations::of(system, &chosen, &weighing, observer)?;
         }
-        let NormalEquations { inner, remaining, .. } = normal;
+        let NormalEquations { inner, of_one, remaining, .. } = normal;
         let of_kernel = chosen.rows.coordinates() == Coordinates::AtLandmarks;
         let Chosen { rows, tolerance } = chosen;
         let noise = |point: usize| (weighing.scale / weighing.weights[point]).ln();
@@ -129,7 +146,7 @@ impl Landmarks {
         let of_prior = if of_kernel { of_factor(rows.l11()) } else { 0.0 };
         let log_determinant = log_noise + of_prior + of_factor(&inner) - rank * weighing.scale.ln();
         let system = system.clone();
-        Ok(Self { system, rows, inner, weighing, tolerance, remaining, log_determinant })
+        Ok(Self { system, rows, inner, of_one, weighing, tolerance, remaining, log_determinant })
     }
 
     pub(super) fn rank(&self) -> usize {
@@ -185,21 +202,20 @@ impl Landmarks {
     /// # Errors
     /// [`crate::error::NumericsError::Cancelled`].
     pub(super) fn fit(&self, values: &[f64], observer: &dyn Observer) -> Result<Fitted> {
-        let unknowns = self.unknowns(values, 1, observer)?;
-        self.completed(values, unknowns, observer)
-    }
-
-    /// Refines the unknowns once, and finds what follows from them.
-    fn completed(&self, values: &[f64], unknowns: Vec<f64>, observer: &dyn Observer) -> Result<Fitted> {
-        let unknowns = match self.rows.coordinates() {
-            Coordinates::Whitened => self.refined(values, unknowns, observer)?,
+        let mut unknowns = self.unknowns(values, 1, observer)?;
+        let at_points = match self.rows.coordinates() {
+            Coordinates::Whitened => {
+                let Refinement { correction, rest } = self.refinement(values, &unknowns, observer)?;
+                unknowns.iter_mut().zip(&correction).for_each(|(x, step)| *x += step);
+                // The correction is small, so a sum of kernels is accurate enough for it.
+                let steps = self.sums_at_points(correction, observer)?;
+                values.iter().zip(&rest).zip(steps).map(|((y, rest), step)| y - rest + step).collect()
+            }
             // Their residual is no more accurate than they are.
-            Coordinates::AtLandmarks => unknowns,
+            Coordinates::AtLandmarks => self.sums_at_points(unknowns.clone(), observer)?,
         };
-        let at_points = self.at_points(&unknowns, 1, observer)?;
         let weights = self.weights(values, &at_points);
-        let mut at_landmarks = unknowns.clone();
-        self.rows.to_weights(MatMut::from_column_major_slice_mut(&mut at_landmarks, self.rank(), 1));
+        let at_landmarks = self.weights_of(unknowns.clone());
         let native_norm_squared = match self.rows.coordinates() {
             Coordinates::Whitened => dot(&unknowns, &unknowns),
             Coordinates::AtLandmarks => dot(&unknowns, &at_landmarks),
@@ -207,6 +223,36 @@ impl Landmarks {
         let rest = values.iter().zip(&at_points).zip(&weights);
         let energy = native_norm_squared + rest.map(|((y, u), w)| (y - u) * w).sum::<f64>();
         Ok(Fitted { weights, at_landmarks, at_points, native_norm_squared, energy })
+    }
+
+    /// The weights b of an expansion: in the order of the points, if all of them are landmarks.
+    pub(super) fn as_expansion(&self, at_landmarks: Vec<f64>) -> Vec<f64> {
+        if self.rank() < self.system.n_points() {
+            return at_landmarks;
+        }
+        let mut weights = vec![0.0; self.rank()];
+        self.points().iter().zip(at_landmarks).for_each(|(&point, weight)| weights[point] = weight);
+        weights
+    }
+
+    /// Whether the true system is solved too, with the landmarks as preconditioner, so that the function is
+    /// that of the dense solver to its last digits. Without noise to speak of, the landmarks alone are that.
+    pub(super) fn preconditions(&self) -> bool {
+        self.rows.coordinates() == Coordinates::Whitened && self.system.n_points() <= MOST_PRECONDITIONED
+    }
+
+    /// The weights b of unknowns `[r]`.
+    fn weights_of(&self, mut unknowns: Vec<f64>) -> Vec<f64> {
+        self.rows.to_weights(MatMut::from_column_major_slice_mut(&mut unknowns, self.rank(), 1));
+        unknowns
+    }
+
+    /// u at the points, `[n]`, for unknowns `[r]`, as a sum of kernels. It takes n r pairs, where the rows
+    /// take n r² flops, but large weights cost digits.
+    fn sums_at_points(&self, unknowns: Vec<f64>, observer: &dyn Observer) -> Result<Vec<f64>> {
+        let weights = self.weights_of(unknowns);
+        let (centres, kernel) = (self.cloud(), self.system.kernel());
+        Expansion { centres, kernel, weights: &weights }.values_at(self.system.cloud(), observer)
     }
 
     /// Overwrites the columns of `[n, k]` values by `(K̂ + D)⁻¹` times them.
@@ -290,26 +336,32 @@ impl Landmarks {
 
     /// One step of iterative refinement, in one pass. The residual `FᵀW(Y − Fβ) − sβ` is as accurate as
     /// `Y − Fβ`, while the factor has lost digits by s being small.
-    fn refined(&self, values: &[f64], mut unknowns: Vec<f64>, observer: &dyn Observer) -> Result<Vec<f64>> {
+    fn refinement(&self, values: &[f64], unknowns: &[f64], observer: &dyn Observer) -> Result<Refinement> {
         let rank = self.rank();
         let mut right = Mat::from_fn(rank, 1, |k, _| -self.weighing.scale * unknowns[k]);
-        let beta = MatRef::from_column_major_slice(&unknowns, rank, 1);
+        let beta = MatRef::from_column_major_slice(unknowns, rank, 1);
+        let mut rest = values.to_vec();
         self.rows.for_each_block(&self.system, observer, |points, block| {
             let par = parallelism((2 * rank * points.len()) as f64);
-            let mut rest = Mat::from_fn(points.len(), 1, |i, _| values[points.start + i]);
-            matmul(rest.as_mut(), Accum::Add, block.rows.transpose(), beta, -1.0, par);
+            let rest = &mut rest[points.clone()];
+            let left = MatMut::from_column_major_slice_mut(rest, points.len(), 1);
+            matmul(left, Accum::Add, block.rows.transpose(), beta, -1.0, par);
             let weights = &self.weighing.weights[points];
-            weights.iter().enumerate().for_each(|(i, weight)| rest[(i, 0)] *= weight);
-            matmul(right.as_mut(), Accum::Add, block.rows, rest.as_ref(), 1.0, par);
+            let weighed = Mat::from_fn(rest.len(), 1, |i, _| weights[i] * rest[i]);
+            matmul(right.as_mut(), Accum::Add, block.rows, weighed.as_ref(), 1.0, par);
         })?;
         self.solve_inner(right.as_mut());
-        unknowns.iter_mut().enumerate().for_each(|(k, x)| *x += right[(k, 0)]);
-        Ok(unknowns)
+        Ok(Refinement { correction: (0..rank).map(|k| right[(k, 0)]).collect(), rest })
     }
 
     /// β or g, `[r, k]`, for values `[n, k]`.
     fn unknowns(&self, values: &[f64], k: usize, observer: &dyn Observer) -> Result<Vec<f64>> {
-        let mut right = self.right(values, k, observer)?;
+        let is_one = k == 1 && values.iter().all(|&value| value == 1.0);
+        let mut right = if is_one {
+            Mat::from_fn(self.rank(), 1, |i, _| self.of_one[i])
+        } else {
+            self.right(values, k, observer)?
+        };
         self.solve_inner(right.as_mut());
         Ok((0..k).flat_map(|j| right.col(j).iter().copied().collect::<Vec<_>>()).collect())
     }
@@ -362,6 +414,23 @@ impl Landmarks {
     pub(super) fn n_bytes(&self) -> usize {
         let square = self.rank() * self.rank() * size_of::<f64>();
         2 * square + vec_bytes(&self.weighing.weights) + self.rows.cloud().n_bytes()
+    }
+}
+
+impl Preconditioned for Landmarks {
+    fn n_points(&self) -> usize {
+        self.system.n_points()
+    }
+
+    fn product(&self, columns: &[f64], observer: &dyn Observer) -> Result<Vec<f64>> {
+        self.system.times(columns, observer)
+    }
+
+    fn precondition(&self, columns: &[f64], observer: &dyn Observer) -> Result<Vec<f64>> {
+        let (n, mut found) = (self.n_points(), columns.to_vec());
+        let k = found.len() / n;
+        self.solve_in_place(MatMut::from_column_major_slice_mut(&mut found, n, k), observer)?;
+        Ok(found)
     }
 }
 

@@ -1,5 +1,6 @@
 //! The normal equations of the values at the landmarks.
 
+use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::{Accum, Mat, MatRef};
 
@@ -12,13 +13,12 @@ use crate::observer::Observer;
 use crate::solver::dense::factorize_in_place;
 use crate::solver::system::System;
 
-/// Multiple of the tolerance beyond which what remains of the diagonal asks for more landmarks.
-const BEYOND: f64 = 4.0;
-
 /// The normal equations, factorized, and what a pass over all points found beside them.
 pub(super) struct NormalEquations {
     /// L_B, lower: the factor of `FᵀWF + sI` or `MᵀWM + sK_ZZ⁻¹`.
     pub inner: Mat<f64>,
+    /// The right-hand side of the constant 1, `FᵀW·1` or `MᵀW·1`, `[r]`.
+    pub of_one: Vec<f64>,
     /// Largest entry that remains of the diagonal.
     pub remaining: f64,
     /// Points where too much remains, those of the largest entries first.
@@ -39,6 +39,7 @@ impl NormalEquations {
     ) -> Result<Self> {
         let (rows, rank) = (&chosen.rows, chosen.rows.n_landmarks());
         let mut inner = Mat::<f64>::zeros(rank, rank);
+        let mut of_one = Mat::<f64>::zeros(rank, 1);
         let mut remaining = 0.0_f64;
         let mut beyond: Vec<(f64, usize)> = Vec::new();
         rows.for_each_block(system, observer, |points, block| {
@@ -49,9 +50,12 @@ impl NormalEquations {
                 let rooted = Mat::from_fn(rank, points.len(), |i, j| roots[j] * block.rows[(i, j)]);
                 add_products(&mut inner, rooted.as_ref());
             }
+            let weights = Mat::from_fn(points.len(), 1, |i, _| weighing.weights[points.start + i]);
+            let par = parallelism((2 * rank * points.len()) as f64);
+            matmul(of_one.as_mut(), Accum::Add, block.rows, weights.as_ref(), 1.0, par);
             for (j, point) in points.enumerate() {
                 remaining = remaining.max(block.remaining[j]);
-                if block.remaining[j] > BEYOND * chosen.tolerance {
+                if block.remaining[j] > chosen.tolerance {
                     beyond.push((block.remaining[j], point));
                 }
             }
@@ -68,7 +72,8 @@ impl NormalEquations {
             }
         }
         factorize_in_place(inner.as_mut(), 0.0, observer)?.map_err(|_| NumericsError::WeightsOverflow)?;
-        Ok(Self { inner, remaining, beyond: beyond.into_iter().map(|(_, point)| point).collect() })
+        let of_one = (0..rank).map(|k| of_one[(k, 0)]).collect();
+        Ok(Self { inner, of_one, remaining, beyond: beyond.into_iter().map(|(_, point)| point).collect() })
     }
 }
 

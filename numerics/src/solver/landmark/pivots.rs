@@ -5,6 +5,7 @@ use faer::{Mat, MatRef};
 use super::Weighing;
 use super::rows::Rows;
 use crate::error::{NumericsError, Result};
+use crate::kernel::Kernel;
 use crate::machine::random::Random;
 use crate::observer::Observer;
 use crate::solver::dense::{PIVOT_TOLERANCE, Pivoting, Tolerance};
@@ -23,6 +24,13 @@ const MOST: f64 = 0.25;
 
 /// Least number of landmarks that is allowed, for clouds of few points.
 const LEAST_MOST: usize = 1_000;
+
+/// What may remain of the diagonal, over what the choice among a sample leaves there. Elsewhere more remains,
+/// and a choice that has to be completed costs another pass over all points.
+const SPARE: f64 = 8.0;
+
+/// Part of what may remain from which a point that is looked at beforehand asks for more landmarks.
+const SUSPECT: f64 = 0.5;
 
 /// Seed of the sample.
 const SEED: u64 = 33;
@@ -47,14 +55,7 @@ impl Chosen {
     /// # Errors
     /// [`NumericsError::RankTooLarge`], [`NumericsError::Cancelled`].
     pub(super) fn among_sample(system: &System, observer: &dyn Observer) -> Result<Self> {
-        let n = system.n_points();
-        let mut points: Vec<usize> = (0..n).collect();
-        if n > SAMPLE {
-            let keys: Vec<u64> = (0..n).map(|point| Random::of(SEED, point as u64).next()).collect();
-            points.select_nth_unstable_by_key(SAMPLE, |&point| (keys[point], point));
-            points.truncate(SAMPLE);
-            points.sort_unstable();
-        }
+        let points = sampled(system.n_points(), SAMPLE);
         Self::among(system, points, observer)
     }
 
@@ -70,7 +71,7 @@ impl Chosen {
         let mut beyond = Vec::new();
         self.rows.for_each_block(&some, observer, |range, block| {
             for (at, remaining) in range.zip(block.remaining) {
-                if *remaining > self.tolerance {
+                if *remaining > SUSPECT * self.tolerance {
                     beyond.push(points[at]);
                 }
             }
@@ -97,8 +98,8 @@ impl Chosen {
 
     fn among(system: &System, points: Vec<usize>, observer: &dyn Observer) -> Result<Self> {
         let (kernel, sample, n) = (system.kernel(), system.cloud().select(&points), points.len());
-        let most = ((MOST * n as f64) as usize).max(LEAST_MOST).min(n);
-        let tolerance = tolerance(system);
+        let most = most_landmarks(n);
+        let tolerance = tolerance(system.n_points(), kernel, system.regularization());
         let mut columns = vec![0.0; n * most];
         let exact = Regularization::Uniform(0.0);
         let pivots =
@@ -111,19 +112,37 @@ impl Chosen {
         let chosen: Vec<usize> = pivots.order[..rank].iter().map(|&at| points[at]).collect();
         let cloud = system.cloud().select(&chosen);
         let coordinates = Weighing::of(system).coordinates(system);
-        Ok(Self { rows: Rows::of(chosen, cloud, l11, coordinates), tolerance: tolerance.at(rank) })
+        let tolerance = SPARE * tolerance.at(rank);
+        Ok(Self { rows: Rows::of(chosen, cloud, l11, coordinates), tolerance })
     }
 }
 
-/// τ as a function of the number of landmarks r: `max(64 ε k₀, 1e-6 α min(r/n, 1e-2))`.
-fn tolerance(system: &System) -> Tolerance {
-    let (n, noise) = (system.n_points(), system.regularization());
+/// Most landmarks among n points.
+pub(super) fn most_landmarks(n: usize) -> usize {
+    ((MOST * n as f64) as usize).max(LEAST_MOST).min(n)
+}
+
+/// What the choice leaves, as a function of the number of landmarks r: `max(64 ε k₀, 1e-6 α min(r/n,
+/// 1e-2)/8)`.
+pub(super) fn tolerance(n: usize, kernel: &Kernel, noise: &Regularization) -> Tolerance {
     let positive = (0..n).map(|point| noise.at(point)).filter(|alpha| *alpha > 0.0);
     let smallest = positive.fold(f64::INFINITY, f64::min);
-    let part = if smallest.is_finite() { PART_OF_NOISE * smallest } else { 0.0 };
+    let part = if smallest.is_finite() { PART_OF_NOISE * smallest / SPARE } else { 0.0 };
     Tolerance {
-        rounding: PIVOT_TOLERANCE * system.kernel().at_zero(),
+        rounding: PIVOT_TOLERANCE * kernel.at_zero(),
         per_pivot: part / n as f64,
         most: part * LARGEST_SHARE,
     }
+}
+
+/// A random sample of n points, in their order, or all of them if there are no more than that.
+pub(super) fn sampled(n: usize, count: usize) -> Vec<usize> {
+    let mut points: Vec<usize> = (0..n).collect();
+    if n > count {
+        let keys: Vec<u64> = (0..n).map(|point| Random::of(SEED, point as u64).next()).collect();
+        points.select_nth_unstable_by_key(count, |&point| (keys[point], point));
+        points.truncate(count);
+        points.sort_unstable();
+    }
+    points
 }

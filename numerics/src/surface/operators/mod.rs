@@ -19,15 +19,15 @@ use rayon::prelude::*;
 
 use super::curvature::tangential_trace;
 use super::geometry::Geometry;
-use crate::error::{NumericsError, Result};
+use crate::error::{NumericsError, Quantity, Result, SolverKind};
 use crate::function::interpolant::Interpolant;
 use crate::kernel::{Kernel, Pairs};
 use crate::machine::registers::{BLOCK, Block, Pack};
 use crate::machine::vector::dot;
 use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
-use crate::solver::Solver;
 use crate::solver::trend::{Basis, Mean};
+use crate::solver::{Method, Solver};
 use crate::sums::jets::{JetOrder, Jets, check_smooth_at};
 use crate::sums::nodes::{Nodes, PackPlace};
 pub(crate) use doubts::JUDGED_FUNCTIONALS;
@@ -91,7 +91,8 @@ impl Operator {
     ///
     /// # Errors
     /// [`NumericsError::DimensionMismatch`], [`NumericsError::KernelNotSmooth`], [`NumericsError::Overflow`],
-    /// [`NumericsError::MeanNotDetermined`], [`NumericsError::Cancelled`].
+    /// [`NumericsError::MeanNotDetermined`], [`NumericsError::Cancelled`]. [`NumericsError::Unsupported`] by
+    /// conjugate gradients, which have no weights but for given values.
     pub fn matrix(
         self,
         geometry: &Geometry,
@@ -100,6 +101,10 @@ impl Operator {
         mean: Mean,
         observer: &dyn Observer,
     ) -> Result<Vec<f64>> {
+        if solver.method() == Method::ConjugateGradients {
+            let (solver, quantity) = (SolverKind::Iterative, Quantity::DenseMatrix);
+            return Err(NumericsError::Unsupported { solver, quantity });
+        }
         let mut matrix = operator_matrix(geometry, solver, queries, self, observer)?;
         OnMean { geometry, solver, mean, operator: self }.make_exact(&mut matrix, observer)?;
         Ok(matrix)

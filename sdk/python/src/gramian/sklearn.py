@@ -48,9 +48,9 @@ class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
         Mean of the function, beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the features. If
         absent, a constant where `kernel` is absent too, else zero.
     solver : str, optional
-        `"dense"`; `"landmark"` for smooth kernels on many samples; `"local"` to predict from the nearest
-        samples; or `"auto"` (if absent): dense up to the largest size that the service factorizes, local
-        beyond.
+        `"dense"`; `"landmark"` for smooth kernels on many samples, or `"iterative"` for rough ones; `"local"`
+        to predict from the nearest samples; or `"auto"` (if absent): dense up to the largest size that the
+        service factorizes, beyond it landmarks where few are enough, else local.
     duplicates : str, optional
         Policy for samples at the same place when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
     client : Client or str, optional
@@ -66,8 +66,8 @@ class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
     mean_coefficients_ : array of `[p]` or `[k, p]`
         The constant, then a slope per feature. p is 0, 1 or 1 + d.
     log_marginal_likelihood_value_ : float or None
-        Log marginal likelihood of the values, summed over columns. None with the local solver, and where the
-        matrix has no Cholesky factor.
+        Log marginal likelihood of the values, summed over columns. None with the local and the iterative
+        solver, and where the matrix has no Cholesky factor.
     cloud_id_ : str
         The id of the samples in the service.
     X_train_, y_train_ : arrays
@@ -277,7 +277,7 @@ def _pinned(cloud: Cloud, values: Array, choices: dict[str, Any]) -> Posterior:
     """Fits values, and returns the answer at one point, with the likelihood if the solver has it."""
     somewhere = None if cloud.points is None else cloud.points[:1]
     answer = cloud.posterior(values, somewhere, **choices)
-    if answer.diagnostics.solver is SolverUsed.LOCAL:
+    if answer.diagnostics.solver in (SolverUsed.LOCAL, SolverUsed.ITERATIVE):
         return answer
     try:
         return cloud.posterior(values, somewhere, include="log_marginal_likelihood", **answer.fit)

@@ -13,10 +13,11 @@ use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::plan::Cost;
-use crate::http::serve::planner::{DenseOnly, GivenValues, Planner};
+use crate::http::serve::planner::{GivenValues, Planner, Restricted};
 use crate::http::wire::write::answer::{answer, json_members};
 use crate::http::wire::write::array::Array;
 use crate::http::wire::write::json::Nullable;
+use gramian_numerics::error::SolverKind;
 use search::{Search, Work};
 
 /// The score that a selection maximizes.
@@ -212,8 +213,12 @@ impl Operation for ModelSelectionRequest {
         }
         let given = GivenValues::one(std::mem::take(&mut self.values));
         let fit = Fit { mean: self.mean, ..self.take_fit() };
-        let dense_only = DenseOnly { name: "model selection", pointer: "/solver" };
-        let (mut main, values) = planner.values_fit(fit, given, Some(dense_only))?;
+        let restricted = Restricted {
+            name: "model selection",
+            pointer: "/solver",
+            without: &[SolverKind::Local, SolverKind::Iterative],
+        };
+        let (mut main, values) = planner.values_fit(fit, given, Some(restricted))?;
         planner.queries(None, &mut main.on)?;
         let (n, d) = (main.on.n_points(), main.on.stored.cloud.dimension());
         if n > MAX_POINTS {

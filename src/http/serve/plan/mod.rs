@@ -11,18 +11,21 @@ use crate::http::problem::{Pointers, Problem};
 use crate::store::Owner;
 use crate::store::clouds::RegisteredCloud;
 use gramian_numerics::machine::price::Price;
-use gramian_numerics::model::choose::AutoLocal;
+use gramian_numerics::model::choose::AutoReason;
 use gramian_numerics::points::sampling::Scales;
 pub use resolved::FitPlan;
 pub use surface::{PlannedSurface, SurfaceSource};
 pub use values::{PlannedValues, Values};
 
 /// A cloud that is fitted for an owner, with the pointers to it in the request.
+#[derive(Clone)]
 pub struct FittedCloud {
     pub owner: Owner,
     pub stored: Arc<RegisteredCloud>,
     pub pointers: Pointers,
     pub duplicates: DuplicatePolicy,
+    /// Largest relative residual of a solver that iterates.
+    pub tolerance: f64,
 }
 
 /// A fit that is checked as far as the request goes. What the request leaves out follows from the cloud or
@@ -94,13 +97,16 @@ impl FittedCloud {
     }
 }
 
-/// Returns the reason for an automatic choice of the local solver, as worded in diagnostics.
-pub fn words(reason: AutoLocal) -> &'static str {
+/// Returns the reason for an automatic choice of a solver, as worded in diagnostics.
+pub fn words(reason: AutoReason) -> &'static str {
     match reason {
-        AutoLocal::BeyondDense => "the cloud has more points than a dense factorization may have",
-        AutoLocal::ManyPoints => "local regressions take time linear in the points, and this cloud is large",
-        AutoLocal::Deviations => "standard deviations come from local regressions",
-        AutoLocal::FineCurve => "the level set of a finely sampled curve comes from local regressions",
+        AutoReason::BeyondDense => "the cloud has more points than a dense factorization may have",
+        AutoReason::ManyPoints => "local regressions take time linear in the points, and this cloud is large",
+        AutoReason::Deviations => "standard deviations come from local regressions",
+        AutoReason::FewLandmarks => {
+            "the cloud has more points than a dense factorization may have, and few landmarks span their kernels"
+        }
+        AutoReason::FineCurve => "the level set of a finely sampled curve comes from local regressions",
     }
 }
 

@@ -11,7 +11,7 @@ use crate::store::clouds::RegisteredCloud;
 use crate::store::key::FitKey;
 use gramian_numerics::error::{NotDefinite, NumericsError};
 use gramian_numerics::model::Recipe;
-use gramian_numerics::model::choose::AutoLocal;
+use gramian_numerics::model::choose::AutoReason;
 use gramian_numerics::model::price::CloudSize;
 use gramian_numerics::model::price::MakingPrice;
 use gramian_numerics::points::cloud::Cloud;
@@ -30,7 +30,7 @@ pub struct FitPlan {
     pub merge: Option<Arc<Merge>>,
     pub recipe: Recipe,
     /// Reason why the solver is local, where `auto` chose it.
-    pub reason: Option<AutoLocal>,
+    pub reason: Option<AutoReason>,
     pub key: FitKey,
     pub pointers: Pointers,
     pub process: Process,
@@ -61,10 +61,11 @@ impl FitPlan {
     pub(super) fn of(
         on: FittedCloud,
         recipe: Recipe,
-        reason: Option<AutoLocal>,
+        reason: Option<AutoReason>,
         process: Process,
     ) -> Result<Self, Problem> {
-        let FittedCloud { owner, stored, pointers, duplicates } = on;
+        let FittedCloud { owner, stored, pointers, duplicates, tolerance } = on;
+        let recipe = recipe.with_tolerance(tolerance);
         let is_singular_at_duplicates = match recipe.process() {
             None => false,
             Some((kernel, regularization)) => {

@@ -6,7 +6,7 @@ use crate::http::fields::kernel::PlannedKernel;
 use crate::http::problem::Problem;
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::defaults::{Purpose, default_fit};
-use gramian_numerics::model::choose::AutoLocal;
+use gramian_numerics::model::choose::AutoReason;
 use gramian_numerics::model::{Recipe, ScaledProcess};
 use gramian_numerics::sums::regularization::Regularization;
 use gramian_numerics::surface::local::Learning;
@@ -28,7 +28,7 @@ pub enum SurfaceSource {
     },
     /// Local regressions. They learn all over the cloud, unless `learning` says otherwise. `reason` is set
     /// where `auto` chose them.
-    Regressions { reason: Option<AutoLocal>, learning: Option<Learning> },
+    Regressions { reason: Option<AutoReason>, learning: Option<Learning> },
 }
 
 impl PlannedSurface {

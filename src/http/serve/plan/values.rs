@@ -11,7 +11,7 @@ use crate::store::learned::LearnedKey;
 use gramian_numerics::error::{NumericsError, SolverKind};
 use gramian_numerics::kernel::Kernel;
 use gramian_numerics::kernel::defaults::{DEFAULT_ALPHA, Purpose, default_fit};
-use gramian_numerics::model::choose::AutoLocal;
+use gramian_numerics::model::choose::AutoReason;
 use gramian_numerics::model::{Recipe, ScaledProcess};
 use gramian_numerics::observer::Observer;
 use gramian_numerics::points::cloud::Cloud;
@@ -39,7 +39,7 @@ pub struct PlannedValues {
     pub(in crate::http::serve) regularization: Option<Regularization>,
     pub solver: SolverKind,
     /// Reason why the solver is local, where `auto` chose it.
-    pub(in crate::http::serve) reason: Option<AutoLocal>,
+    pub(in crate::http::serve) reason: Option<AutoReason>,
     pub(in crate::http::serve) mean: Mean,
     pub(in crate::http::serve) values: Option<Arc<Values>>,
     pub(in crate::http::serve) learned: Option<Arc<Learned>>,

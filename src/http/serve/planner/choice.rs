@@ -1,28 +1,41 @@
 //! Choice of kernel, regularization and solver in a request, and refusals of combinations that do not work.
 
 use super::inputs::length_mismatch;
+use crate::http::fields::kernel::PlannedKernel;
 use crate::http::fields::{Fit, Geometry, Hyperparameters, Kernel, SolverChoice};
 use crate::http::problem::slug::Slug;
 use crate::http::problem::{Pointers, Problem};
 use crate::http::serve::plan::FittedCloud;
 use crate::http::wire::read::points::Points;
+use crate::store::key::process_key;
+use gramian_numerics::error::SolverKind;
+use gramian_numerics::kernel::defaults::DEFAULT_ALPHA;
+use gramian_numerics::model::choose::prefers_landmarks;
+use gramian_numerics::observer::Unobserved;
+use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::solver::trend::Mean;
+use gramian_numerics::solver::{DEFAULT_TOLERANCE, TOLERANCES, expected_landmarks};
 use gramian_numerics::sums::regularization::Regularization;
 
-/// A requested quantity that only the dense solver provides: its name, and the pointer to it.
+/// A requested quantity that not every solver provides: its name, the pointer to it, and the solvers without.
 #[derive(Debug, Clone, Copy)]
-pub struct DenseOnly {
+pub struct Restricted {
     pub name: &'static str,
     pub pointer: &'static str,
+    pub without: &'static [SolverKind],
 }
 
-impl DenseOnly {
-    /// Returns 422 where the request asks the local solver for this quantity.
-    pub(super) fn refused_by_local(self) -> Problem {
-        let detail = format!(
-            "the local solver treats each query separately, so it has no {}; leave it out, or set \"solver\": \"dense\"",
-            self.name
-        );
+impl Restricted {
+    /// Returns 422 where the request asks a solver for this quantity that does not provide it.
+    pub(super) fn refused_by(self, solver: SolverKind) -> Problem {
+        let why = match solver {
+            SolverKind::Local => "the local solver treats each query separately",
+            SolverKind::Iterative => "the iterative solver has weights for given values alone",
+            SolverKind::Landmark => "landmarks stand for all points",
+            SolverKind::Dense => "the dense solver takes all points at once",
+        };
+        let name = self.name;
+        let detail = format!("{why}, so it has no {name}; leave it out, or set \"solver\": \"dense\"");
         Problem::of_field(Slug::UnsupportedBySolver, self.pointer, detail)
     }
 
@@ -47,6 +60,46 @@ pub(super) fn only_local_learns(member: &str) -> Problem {
     let detail =
         format!("only local regressions take {member}: leave them out, or set \"solver\": \"local\"");
     Problem::of_field(Slug::UnsupportedBySolver, format!("/{member}"), detail)
+}
+
+/// Looks whether few landmarks span the kernel of a request. A kernel that is not given follows from the
+/// values, and is rough.
+///
+/// # Errors
+/// Returns 422 for a kernel or noise that is refused.
+pub(super) fn has_few_landmarks(fit: &Fit, on: &FittedCloud) -> Result<bool, Problem> {
+    let Some(kernel) = &fit.kernel else { return Ok(false) };
+    let PlannedKernel::Given(kernel) = kernel.plan(on.pointers)? else { return Ok(false) };
+    let options =
+        FitOptions { alpha: fit.alpha, noise_variances: fit.noise_variances.clone(), ..Default::default() };
+    let noise = options.regularization(on)?.unwrap_or(Regularization::Uniform(DEFAULT_ALPHA));
+    let refused = |error| Problem::from_numerics(error, on.pointers);
+    kernel.check_dimension(on.stored.cloud.dimension()).map_err(refused)?;
+    let look = |cloud: &Cloud| expected_landmarks(cloud, &kernel, &noise, &Unobserved);
+    let n_landmarks = on.stored.landmarks(process_key(&kernel, &noise), look).map_err(refused)?;
+    Ok(n_landmarks.is_some_and(|n_landmarks| prefers_landmarks(on.n_points(), n_landmarks)))
+}
+
+/// Returns the tolerance of a request.
+///
+/// # Errors
+/// Returns 422 for one that is out of range, or where another solver is asked for, which has none.
+pub(super) fn checked_tolerance(fit: &Fit) -> Result<f64, Problem> {
+    let refused = |detail: String| Err(Problem::invalid_request("/tolerance", detail));
+    match (fit.tolerance, fit.solver) {
+        (None, _) => Ok(DEFAULT_TOLERANCE),
+        (Some(_), SolverChoice::Dense | SolverChoice::Landmark | SolverChoice::Local) => {
+            refused("only the solver iterative has a tolerance".to_owned())
+        }
+        (Some(tolerance), SolverChoice::Auto | SolverChoice::Iterative) => {
+            let (least, most) = (TOLERANCES.start(), TOLERANCES.end());
+            if TOLERANCES.contains(&tolerance) {
+                Ok(tolerance)
+            } else {
+                refused(format!("a tolerance lies between {least:e} and {most:e}, not at {tolerance:e}"))
+            }
+        }
+    }
 }
 
 /// Returns the pointers to the fit of a request.

@@ -16,13 +16,14 @@ use crate::http::wire::read::limits::too_many_dense_points;
 use crate::store::Owner;
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::{CloudId, GivenKernel, ValuesKey};
-pub use choice::DenseOnly;
+pub use choice::Restricted;
 use choice::{
-    FitOptions, TRY_LOCAL, local_lacks_operators, only_local_learns, pointers_of, pointers_of_surface,
+    FitOptions, TRY_LOCAL, checked_tolerance, has_few_landmarks, local_lacks_operators, only_local_learns,
+    pointers_of, pointers_of_surface,
 };
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::defaults::Purpose;
-use gramian_numerics::model::choose::{AutoLocal, UnfittedSurface, prefers_local};
+use gramian_numerics::model::choose::{AutoReason, UnfittedSurface, prefers_local};
 use gramian_numerics::patches::MAX_LOCAL_DIMENSION;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::solver::trend::Mean;
@@ -61,7 +62,7 @@ impl<'a> Planner<'a> {
         found.or_else(|| self.app.clouds.get(self.owner, id))
     }
 
-    /// Checks the fit of values. `dense_only` is a requested quantity that only the dense solver has, if any.
+    /// Checks the fit of values. `restricted` is a requested quantity that not every solver has, if any.
     ///
     /// # Errors
     /// Returns a [`Problem`] with a pointer to the field.
@@ -69,13 +70,13 @@ impl<'a> Planner<'a> {
         &self,
         mut fit: Fit,
         given: GivenValues,
-        dense_only: Option<DenseOnly>,
+        restricted: Option<Restricted>,
     ) -> Result<(PlannedValues, Arc<Values>), Problem> {
         let on = self.fitted_cloud(&mut fit)?;
-        let solver = self.solver_of_values(&fit, &on.stored);
-        if let Some(asked) = dense_only.filter(|_| solver.kind == SolverKind::Local) {
+        let solver = self.solver_of_values(&fit, &on)?;
+        if let Some(asked) = restricted.filter(|asked| asked.without.contains(&solver.kind)) {
             return Err(match solver.reason {
-                None => asked.refused_by_local(),
+                None => asked.refused_by(solver.kind),
                 Some(_) => self.beyond_dense(&on).with_remedy(&asked.remedy()),
             });
         }
@@ -100,7 +101,8 @@ impl<'a> Planner<'a> {
     fn fitted_cloud(&self, fit: &mut Fit) -> Result<FittedCloud, Problem> {
         let pointers = pointers_of(fit);
         let stored = self.cloud(std::mem::take(&mut fit.cloud), "/cloud")?;
-        Ok(FittedCloud { owner: self.owner, stored, pointers, duplicates: fit.duplicates })
+        let (duplicates, tolerance) = (fit.duplicates, checked_tolerance(fit)?);
+        Ok(FittedCloud { owner: self.owner, stored, pointers, duplicates, tolerance })
     }
 
     fn plan_surface(
@@ -215,23 +217,29 @@ impl<'a> Planner<'a> {
         request: &GeometryRequest,
     ) -> Result<OperatorFits, Problem> {
         let on = self.fitted_cloud(&mut fit)?;
-        let (solver, options) = (self.solver_of_values(&fit, &on.stored), FitOptions::of(fit));
+        let (solver, options) = (self.solver_of_values(&fit, &on)?, FitOptions::of(fit));
         let under = self.surface_under(&on, options.clone(), geometry)?;
         let (main, values) = self.plan_given_values(on, options, solver, given)?;
         Ok(OperatorFits { main, values, surface: self.plan_surface_under(under, request)? })
     }
 
-    /// Chooses the solver of values where both solvers would do, with the reason where `auto` chose the local
-    /// one.
-    fn solver_of_values(&self, fit: &Fit, stored: &RegisteredCloud) -> ValuesSolver {
-        match fit.solver {
+    /// Chooses the solver of values where several would do, with the reason where `auto` did not choose the
+    /// dense one.
+    fn solver_of_values(&self, fit: &Fit, on: &FittedCloud) -> Result<ValuesSolver, Problem> {
+        Ok(match fit.solver {
             SolverChoice::Local => ValuesSolver::asked(SolverKind::Local),
-            SolverChoice::Auto if stored.cloud.n_points() > self.app.config.max_dense_points => {
-                ValuesSolver { kind: SolverKind::Local, reason: Some(AutoLocal::BeyondDense) }
+            SolverChoice::Auto if on.n_points() > self.app.config.max_dense_points => {
+                let (kind, reason) = if has_few_landmarks(fit, on)? {
+                    (SolverKind::Landmark, AutoReason::FewLandmarks)
+                } else {
+                    (SolverKind::Local, AutoReason::BeyondDense)
+                };
+                ValuesSolver { kind, reason: Some(reason) }
             }
             SolverChoice::Landmark => ValuesSolver::asked(SolverKind::Landmark),
+            SolverChoice::Iterative => ValuesSolver::asked(SolverKind::Iterative),
             SolverChoice::Auto | SolverChoice::Dense => ValuesSolver::asked(SolverKind::Dense),
-        }
+        })
     }
 
     /// Checks the fits for a matrix on values that are not given: of these values, and of the surface under
@@ -249,6 +257,10 @@ impl<'a> Planner<'a> {
     ) -> Result<(PlannedValues, PlannedSurface), Problem> {
         if fit.solver == SolverChoice::Local {
             return Err(local_lacks_operators("/solver"));
+        }
+        if fit.solver == SolverChoice::Iterative {
+            return Err(Restricted { name: "matrices", pointer: "/solver", without: &[] }
+                .refused_by(SolverKind::Iterative));
         }
         let on = self.fitted_cloud(&mut fit)?;
         let (solver, options) = (ValuesSolver::asked(of_whole(fit.solver)), FitOptions::of(fit));
@@ -295,7 +307,7 @@ impl<'a> Planner<'a> {
             sites: options.sites,
             hyperparameters: options.hyperparameters,
         };
-        let on = FittedCloud { owner: self.owner, stored, pointers, duplicates: values.duplicates };
+        let on = FittedCloud { stored, pointers, ..values.clone() };
         Ok(SurfaceUnder { on, options, has_own_process })
     }
 
@@ -398,6 +410,7 @@ pub struct OperatorFits {
 fn of_whole(choice: SolverChoice) -> SolverKind {
     match choice {
         SolverChoice::Landmark => SolverKind::Landmark,
+        SolverChoice::Iterative => SolverKind::Iterative,
         SolverChoice::Auto | SolverChoice::Dense | SolverChoice::Local => SolverKind::Dense,
     }
 }
@@ -406,14 +419,14 @@ fn of_whole(choice: SolverChoice) -> SolverKind {
 enum Regressed {
     No,
     /// Local regressions, with the reason where `auto` chose them.
-    Locally(Option<AutoLocal>),
+    Locally(Option<AutoReason>),
 }
 
-/// Solver of values, with the reason where `auto` chose the local one.
+/// Solver of values, with the reason where `auto` did not choose the dense one.
 #[derive(Clone, Copy)]
 struct ValuesSolver {
     kind: SolverKind,
-    reason: Option<AutoLocal>,
+    reason: Option<AutoReason>,
 }
 
 impl ValuesSolver {

@@ -3,42 +3,19 @@
 use pulp::Simd;
 
 use super::Factored;
+use crate::function::local_kriging::batch::Batch;
 use crate::function::local_kriging::parts::{CROSS, QUANTITIES, VALUES};
 use crate::kernel::in_place::{Covariances, CovariancesAndSlopes};
-use crate::machine::lanes::triangle;
 use crate::machine::registers::BLOCK;
+use crate::sums::side_by_side::{SideBySide, scaling};
 
 impl<S: Simd> Factored<'_, S> {
-    /// Fills the triangle with `K + noise`. Rows of empty places are those of the identity.
+    /// Fills the triangle with `K + noise`.
     #[inline(always)]
     pub(super) fn fill_triangle(&mut self) {
-        let (n, count) = (self.n, self.batch.count);
-        for i in 0..count {
-            let row = triangle(i);
-            for axis in 0..self.batch.dimension {
-                let x = self.of(&self.batch.points, axis * n + i);
-                for j in 0..i {
-                    let step = x - self.of(&self.batch.points, axis * n + j);
-                    let before = if axis == 0 { self.lower.splat(0.0) } else { self.lower.at(row + j) };
-                    self.lower.set(row + j, step.mul_add(step, before));
-                }
-            }
-        }
-        let scaling = self.scaling();
-        for block in 0..triangle(count).div_ceil(Self::PER_BLOCK) {
-            let entries = &mut self.lower.registers[block * Self::PER_BLOCK..][..Self::PER_BLOCK];
-            self.kernel.profiles(Covariances { simd: self.lower.simd, entries, scaling });
-        }
-        for i in 0..count {
-            let diagonal = self.of(&self.batch.noise, i) + self.kernel.at_zero();
-            self.lower.set(triangle(i) + i, diagonal);
-        }
-        for i in count..n {
-            for j in 0..i {
-                self.lower.set(triangle(i) + j, self.lower.splat(0.0));
-            }
-            self.lower.set(triangle(i) + i, self.lower.splat(1.0));
-        }
+        let Batch { dimension, count, points, noise, .. } = self.batch;
+        let systems = SideBySide { dimension: *dimension, count: *count, points, noise };
+        systems.fill_triangle(self.kernel, &mut self.lower);
     }
 
     /// Fills the rows of values, of covariances with the query and, for derivatives, of φ′ and φ″.
@@ -55,7 +32,7 @@ impl<S: Simd> Factored<'_, S> {
             self.lower.set(values + j, self.of(&self.batch.values, j));
         }
         let (length, slopes) = (self.n.next_multiple_of(BLOCK), self.row(self.parts.slopes()));
-        let (simd, scaling) = (self.lower.simd, self.scaling());
+        let (simd, scaling) = (self.lower.simd, scaling(self.kernel));
         for block in 0..self.n.div_ceil(Self::PER_BLOCK) {
             let at = block * Self::PER_BLOCK;
             let (rows, rest) = self.lower.registers.split_at_mut(slopes);

@@ -14,12 +14,11 @@ mod sums;
 use pulp::{Simd, WithSimd};
 
 use super::batch::Batch;
-use super::parts::{COLUMNS, Parts};
+use super::parts::Parts;
 use crate::kernel::Kernel;
-use crate::kernel::in_place::Scaling;
-use crate::machine::lanes::{self, Layout, Lower, MAX_LANES};
+use crate::machine::lanes::{self, COLUMNS, Layout, Lower, MAX_LANES};
 use crate::machine::registers::{BLOCK, Pack};
-use rounding::{Guarded, VANISHES};
+use rounding::Guarded;
 
 /// Buffers for one batch.
 pub(super) struct Workspace {
@@ -77,16 +76,11 @@ struct Factored<'a, S: Simd> {
 impl<S: Simd> Factored<'_, S> {
     const PER_BLOCK: usize = BLOCK / S::F64_LANES;
 
-    /// Factorizes with as many rows at once as there are registers for.
     #[inline(always)]
     fn factorize(&mut self) {
         let solved = self.n..self.n + self.parts.n_solved();
         let rounding = Guarded::new(self.kernel, self.n);
-        if S::F64_LANES == MAX_LANES {
-            self.lower.factorize::<4, COLUMNS>(solved, &rounding);
-        } else {
-            self.lower.factorize::<2, COLUMNS>(solved, &rounding);
-        }
+        self.lower.factorize_wide(solved, &rounding);
     }
 
     /// Returns the place of a row below the triangle.
@@ -104,14 +98,5 @@ impl<S: Simd> Factored<'_, S> {
     #[inline(always)]
     fn difference(&self, axis: usize, j: usize) -> Pack<S, 1> {
         self.of(&self.batch.query, axis) - self.of(&self.batch.points, axis * self.n + j)
-    }
-
-    #[inline(always)]
-    fn scaling(&self) -> Scaling {
-        Scaling {
-            inverse_square_length: self.kernel.inverse_square_length(),
-            variance: self.kernel.variance(),
-            least: VANISHES,
-        }
     }
 }

@@ -7,13 +7,7 @@ use crate::kernel::Kernel;
 use crate::machine::lanes::Rounding;
 use crate::machine::registers::Pack;
 use crate::solver::PIVOT_TOLERANCE;
-
-/// 2⁻⁵⁰⁰. Correlations below this are set to 0, and so are entries of the factor below this times √k₀.
-///
-/// With k₀ near 1, no product of two remaining entries is subnormal. Some processors take a hundred cycles
-/// for each subnormal product. Values that are tiny beside the greatest of their neighbourhood may still lead
-/// to some.
-pub(super) const VANISHES: f64 = f64::from_bits((1023 - 500) << 52);
+use crate::sums::side_by_side::VANISHES;
 
 /// Rounding of a factor without the points that depend on others, and without entries next to nothing.
 pub(super) struct Guarded {

@@ -110,6 +110,8 @@ def _unreported(request: Mapping[str, Any]) -> OperatorFit:
     fit = OperatorFit()
     if "duplicates" in request:
         fit["duplicates"] = DuplicatePolicy(request["duplicates"])
+    if "tolerance" in request:
+        fit["tolerance"] = request["tolerance"]
     if "hyperparameters" in request:
         fit["hyperparameters"] = request["hyperparameters"]
     return fit

@@ -44,7 +44,7 @@ Whole: TypeAlias = int | np.integer[Any] | npt.NDArray[np.integer[Any]]
 
 # Every enumeration of the service may also be given as a plain string. tests/test_types.py compares the two.
 Family: TypeAlias = KernelFamily | Literal["gauss", "laplace", "matern", "wendland", "inverse_multiquadric"]
-Solver: TypeAlias = SolverChoice | SolverUsed | Literal["auto", "dense", "landmark", "local"]
+Solver: TypeAlias = SolverChoice | SolverUsed | Literal["auto", "dense", "landmark", "iterative", "local"]
 Duplicates: TypeAlias = DuplicatePolicy | Literal["refuse", "merge"]
 Surface: TypeAlias = SurfaceChoice | Literal["auto", "signature", "offset", "local"]
 Deviations: TypeAlias = GeometryInclude | Literal["deviations"]
@@ -160,10 +160,12 @@ class Fit(TypedDict, total=False):
     noise_variances : array_like, `[n]`, optional
         The noise variance at each point, V², instead of `alpha`.
     solver : str, optional
-        `"dense"`; `"landmark"` for smooth kernels on up to millions of points; `"local"` to answer each query
-        from the points nearest to it, for any number of points; or `"auto"` (if absent) to let the service
-        choose. Local regressions of surfaces take neither `kernel`
-        nor `alpha`.
+        `"dense"`; `"landmark"` for smooth kernels on up to millions of points; `"iterative"` for rough
+        kernels on up to a hundred thousand; `"local"` to answer each query from the points nearest to it, for
+        any number of points; or `"auto"` (if absent) to let the service choose. Local regressions of surfaces
+        take neither `kernel` nor `alpha`.
+    tolerance : float, optional
+        The largest relative residual of an answer of the solver `"iterative"`: 1e-8 if absent.
     duplicates : str, optional
         Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
     """
@@ -172,6 +174,7 @@ class Fit(TypedDict, total=False):
     alpha: Number | None
     noise_variances: npt.ArrayLike | None
     solver: Solver | None
+    tolerance: Number | None
     duplicates: Duplicates | None
 
 

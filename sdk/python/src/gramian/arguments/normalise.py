@@ -279,6 +279,7 @@ FREE_PARAMETER: Mapping[str, Rule] = {
 
 REQUEST: Mapping[str, Rule] = {
     **FIT,
+    "tolerance": number,
     "duplicates": word(*DuplicatePolicy),
     "points": array("n", "d"),
     "normals": array("n", "d"),

@@ -9,14 +9,14 @@ use crate::http::serve::answers::values::mean_coefficients;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::plan::Cost;
-use crate::http::serve::planner::{DenseOnly, Planner, value_lists};
+use crate::http::serve::planner::{Planner, Restricted, value_lists};
 use crate::http::wire::read::points::{Points, ValueLists};
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
-use gramian_numerics::function::price::many_price;
+use gramian_numerics::error::SolverKind;
 use gramian_numerics::machine::price::Sizes;
 use gramian_numerics::model::EachAt;
-use gramian_numerics::model::price::function_price;
+use gramian_numerics::model::price::{function_price, lists_price};
 
 request! {
     /// Many lists of values at the points of a cloud, and queries at which to evaluate the functions through
@@ -94,7 +94,7 @@ impl Operation for InterpolationBatchRequest {
         let given = value_lists(std::mem::take(&mut self.values))?;
         let fit = Fit { mean: self.mean, ..self.take_fit() };
         let has_deviations = has_deviations(self.include);
-        let of_batch = DenseOnly { name: "batches", pointer: "/solver" };
+        let of_batch = Restricted { name: "batches", pointer: "/solver", without: &[SolverKind::Local] };
         let (mut main, values) = planner.values_fit(fit, given, Some(of_batch))?;
         let queries = planner.queries(self.queries, &mut main.on)?;
         let (n, m, d) = (main.on.n_points(), queries.n_points(), queries.dimension());
@@ -102,7 +102,7 @@ impl Operation for InterpolationBatchRequest {
         let n_deviations = if has_deviations { deviations_per_query(d, derivatives) } else { 0 };
         let sizes = Sizes { n_points: n, n_queries: m, dimension: d };
         let work = function_price(main.solver, usize::from(derivatives), n_deviations, sizes)
-            .and(many_price(k, per_query - 1, sizes));
+            .and(lists_price(main.solver, k, per_query - 1, sizes));
         let of_means = k.checked_mul(1 + d);
         let n_numbers = k
             .checked_add(usize::from(has_deviations))

@@ -10,10 +10,10 @@ use crate::http::serve::answers::values::mean_coefficients;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::Plan;
 use crate::http::serve::plan::{Cost, PlannedValues, Values};
-use crate::http::serve::planner::{DenseOnly, GivenValues, Planner, check_seed};
+use crate::http::serve::planner::{GivenValues, Planner, Restricted, check_seed};
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::array::Array;
-use gramian_numerics::error::NumericsError;
+use gramian_numerics::error::{NumericsError, SolverKind};
 use gramian_numerics::function::batch::BatchJets;
 use gramian_numerics::function::deviations::JetDeviations;
 use gramian_numerics::function::interpolant::Interpolant;
@@ -59,18 +59,17 @@ impl Asked {
         self.samples.map_or(0, |samples| samples.count)
     }
 
-    /// Returns a part of the answer that needs the dense solver, if one is asked for.
-    fn dense_only(&self) -> Option<DenseOnly> {
-        let name = self.include.iter().find_map(|quantity| match quantity {
-            Q::Covariance => Some("covariance"),
-            Q::LogMarginalLikelihood => Some("log_marginal_likelihood"),
-            Q::Variance | Q::ObservationVariance | Q::Gradients | Q::GradientVariances => None,
-        });
-        match (name, self.samples) {
-            (Some(name), _) => Some(DenseOnly { name, pointer: "/include" }),
-            (None, Some(_)) => Some(DenseOnly { name: "samples", pointer: "/samples" }),
-            (None, None) => None,
+    /// Returns a part of the answer that not every solver has, if one is asked for: that which fewest have.
+    fn restricted(&self) -> Option<Restricted> {
+        let not_local: &[SolverKind] = &[SolverKind::Local];
+        if self.wants(Q::LogMarginalLikelihood) {
+            let without: &[SolverKind] = &[SolverKind::Local, SolverKind::Iterative];
+            return Some(Restricted { name: "log_marginal_likelihood", pointer: "/include", without });
         }
+        if self.wants(Q::Covariance) {
+            return Some(Restricted { name: "covariance", pointer: "/include", without: not_local });
+        }
+        self.samples.map(|_| Restricted { name: "samples", pointer: "/samples", without: not_local })
     }
 
     fn check(&self) -> Result<(), Problem> {
@@ -155,9 +154,9 @@ impl Work {
         asked: Asked,
     ) -> Result<Plan<Self>, Problem> {
         asked.check()?;
-        let of_batch = DenseOnly { name: "batches", pointer: "/solver" };
-        let dense_only = asked.dense_only().or(given.n_lists.map(|_| of_batch));
-        let (mut main, values) = planner.values_fit(fit, given, dense_only)?;
+        let of_batch = Restricted { name: "batches", pointer: "/solver", without: &[SolverKind::Local] };
+        let restricted = asked.restricted().or(given.n_lists.map(|_| of_batch));
+        let (mut main, values) = planner.values_fit(fit, given, restricted)?;
         let queries = planner.queries(queries, &mut main.on)?;
         asked.check_noise(&main)?;
         let (m, d) = (queries.n_points(), queries.dimension());

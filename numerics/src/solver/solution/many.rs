@@ -4,11 +4,12 @@ use std::borrow::Cow;
 
 use faer::MatMut;
 
-use super::solution::Candidate;
-use super::trend::{Mean, Trend};
-use super::{Method, Solution, Solver};
+use super::Solution;
+use super::candidate::Candidate;
 use crate::error::{NumericsError, Result};
 use crate::observer::{Observer, Stage};
+use crate::solver::trend::{Mean, Trend};
+use crate::solver::{Method, Solver};
 use crate::sums::many::values_of_each;
 
 /// Number of lists that are solved together.

@@ -5,10 +5,11 @@
 
 use faer::MatMut;
 
-use super::{Method, Solution, Solver};
+use super::Solution;
 use crate::error::{NumericsError, Result};
 use crate::machine::vector::norm;
 use crate::observer::Observer;
+use crate::solver::{Method, Solver};
 
 /// Number of values that are examined. Those with the largest weights are about the ones that the others
 /// explain worst.
@@ -122,12 +123,12 @@ impl Solution {
 mod tests {
     use std::sync::Arc;
 
-    use super::super::System;
-    use super::super::trend::Mean;
     use super::*;
     use crate::kernel::{Family, Kernel};
     use crate::observer::Unobserved;
     use crate::points::cloud::Cloud;
+    use crate::solver::System;
+    use crate::solver::trend::Mean;
     use crate::sums::regularization::Regularization;
     use crate::testing::Random;
 

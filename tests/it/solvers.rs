@@ -1,0 +1,207 @@
+//! The solvers `landmark` and `iterative` over HTTP: the answers of the dense one, what they say of
+//! themselves, and their refusals.
+
+use serde_json::{Value, json};
+
+use crate::support::{Server, fibonacci_sphere, numbers};
+
+/// A request over 600 points of the sphere that several solvers take, with a kernel that suits them.
+fn body(solver: &str, kernel: &Value, more: &Value) -> Value {
+    let points = fibonacci_sphere(600);
+    let values: Vec<f64> = points.iter().map(|x| (2.0 * x[0]).sin() + x[1] * x[2]).collect();
+    let mut body = json!({"cloud": {"points": points}, "solver": solver, "alpha": 1e-4, "kernel": kernel});
+    if more.get("values").is_some() {
+        body["values"] = json!(values);
+    }
+    for (name, value) in more.as_object().unwrap().iter().filter(|(name, _)| *name != "values") {
+        body[name] = value.clone();
+    }
+    body
+}
+
+/// A kernel for landmarks.
+fn smooth() -> Value {
+    json!({"family": "gauss", "length_scale": 1.0})
+}
+
+/// A kernel for conjugate gradients.
+fn rough() -> Value {
+    json!({"family": "matern", "nu": 2.5, "length_scale": 0.5})
+}
+
+/// Checks that numbers agree, relative to the largest of them.
+fn check_near(found: &Value, expected: &Value, tolerance: f64) {
+    let (found, expected) = (numbers(found), numbers(expected));
+    assert_eq!(found.len(), expected.len());
+    let largest = expected.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
+    for (a, b) in found.iter().zip(&expected) {
+        assert!((a - b).abs() <= tolerance * largest, "{a} and {b}");
+    }
+}
+
+/// The path of an operation, its request, and the members of its answer with their relative difference from
+/// the dense one.
+type Asked = (&'static str, Value, Vec<(&'static str, f64)>);
+
+/// Operations of all solvers over all points. Derivatives lose more than values.
+fn operations() -> Vec<Asked> {
+    let queries = [[0.6, 0.8, 0.0], [0.0, -0.6, 0.8], [-0.48, 0.64, 0.6]];
+    let on_signature = json!({"surface": "signature"});
+    vec![
+        (
+            "/v1/interpolation",
+            json!({"values": true, "queries": queries, "derivatives": 1}),
+            vec![("values", 1e-8), ("gradients", 1e-5)],
+        ),
+        (
+            "/v1/posterior",
+            json!({"values": true, "queries": queries, "include": ["variance", "covariance", "gradient_variances"],
+                "mean": "constant"}),
+            vec![("means", 1e-8), ("variances", 1e-5), ("covariance", 1e-5), ("gradient_variances", 1e-5)],
+        ),
+        ("/v1/normals", json!({"queries": queries, "surface": "signature"}), vec![("normals", 1e-5)]),
+        (
+            "/v1/curvatures",
+            json!({"queries": queries, "surface": "signature"}),
+            vec![("mean_curvatures", 1e-3)],
+        ),
+        (
+            "/v1/surface-gradient",
+            json!({"values": true, "queries": queries, "geometry": on_signature}),
+            vec![("gradients", 1e-5)],
+        ),
+        (
+            "/v1/laplace-beltrami",
+            json!({"values": true, "queries": queries, "geometry": on_signature}),
+            vec![("values", 1e-3)],
+        ),
+    ]
+}
+
+#[tokio::test]
+async fn every_operation_answers_as_with_the_dense_solver() {
+    let server = Server::start().await;
+    for (solver, factorization, kernel) in
+        [("landmark", "landmark", smooth()), ("iterative", "conjugate_gradients", rough())]
+    {
+        for (path, more, members) in operations() {
+            let dense = server.post(path, &body("dense", &kernel, &more)).await.expect_ok();
+            let found = server.post(path, &body(solver, &kernel, &more)).await.expect_ok();
+            for (member, tolerance) in members {
+                check_near(&found[member], &dense[member], tolerance);
+            }
+            let diagnostics = &found["diagnostics"];
+            assert_eq!(
+                (&diagnostics["solver"], &diagnostics["factorization"]),
+                (&json!(solver), &json!(factorization))
+            );
+        }
+    }
+}
+
+#[tokio::test]
+async fn landmarks_have_matrices_and_conjugate_gradients_have_none() {
+    let server = Server::start().await;
+    let more = json!({"queries": [[0.6, 0.8, 0.0]], "geometry": {"surface": "signature"}});
+    let path = "/v1/laplace-beltrami/matrix";
+    let dense = server.post(path, &body("dense", &smooth(), &more)).await.expect_ok();
+    let found = server.post(path, &body("landmark", &smooth(), &more)).await.expect_ok();
+    check_near(&found["matrix"], &dense["matrix"], 1e-3);
+    let of_matrix = server.post(path, &body("iterative", &rough(), &more)).await;
+    of_matrix.expect_problem(422, "unsupported-by-solver");
+    let more = json!({"values": true, "queries": [[0.6, 0.8, 0.0]], "include": ["log_marginal_likelihood"]});
+    let of_likelihood = server.post("/v1/posterior", &body("iterative", &rough(), &more)).await;
+    let problem = of_likelihood.expect_problem(422, "unsupported-by-solver");
+    assert_eq!(problem["errors"][0]["pointer"], "/include", "{problem}");
+}
+
+#[tokio::test]
+async fn an_iteration_ends_within_the_tolerance_or_is_refused() {
+    let server = Server::start().await;
+    let asked = |tolerance: f64, alpha: f64| {
+        let more =
+            json!({"values": true, "queries": [[0.6, 0.8, 0.0]], "tolerance": tolerance, "alpha": alpha});
+        body("iterative", &rough(), &more)
+    };
+    let mut iterations = Vec::new();
+    for tolerance in [1e-6, 1e-11] {
+        let answer = server.post("/v1/interpolation", &asked(tolerance, 1e-4)).await.expect_ok();
+        let diagnostics = &answer["diagnostics"];
+        assert_eq!(diagnostics["tolerance"], tolerance);
+        assert!(diagnostics["relative_residual"].as_f64().unwrap() <= tolerance, "{diagnostics}");
+        iterations.push(diagnostics["iterations"].as_u64().unwrap());
+    }
+    assert!(iterations[0] < iterations[1], "{iterations:?}");
+    let refused = server.post("/v1/interpolation", &asked(1e-14, 0.0)).await;
+    let problem = refused.expect_problem(422, "not-converged");
+    assert_eq!(problem["errors"][0]["pointer"], "/tolerance", "{problem}");
+}
+
+#[tokio::test]
+async fn a_tolerance_that_means_nothing_is_refused() {
+    let server = Server::start().await;
+    for (solver, tolerance) in [("dense", 1e-8), ("landmark", 1e-8), ("iterative", 0.0), ("iterative", 0.1)] {
+        let more = json!({"values": true, "queries": [[0.6, 0.8, 0.0]], "tolerance": tolerance});
+        let refused = server.post("/v1/interpolation", &body(solver, &rough(), &more)).await;
+        let problem = refused.expect_problem(422, "invalid-request");
+        assert_eq!(problem["errors"][0]["pointer"], "/tolerance", "{problem}");
+    }
+}
+
+#[tokio::test]
+async fn the_answer_says_how_many_landmarks_there_are_and_what_they_leave() {
+    let server = Server::start().await;
+    let more = json!({"values": true, "queries": [[0.6, 0.8, 0.0]]});
+    let answer = server.post("/v1/interpolation", &body("landmark", &smooth(), &more)).await.expect_ok();
+    let diagnostics = &answer["diagnostics"];
+    assert!((50..500).contains(&diagnostics["rank"].as_u64().unwrap()), "{diagnostics}");
+    let [remaining, tolerance, residual] = ["remaining_diagonal", "tolerance", "relative_residual"]
+        .map(|member| diagnostics[member].as_f64().unwrap());
+    assert!(tolerance <= 1e-10 && remaining <= 4.0 * tolerance && residual < 1e-8, "{diagnostics}");
+}
+
+#[tokio::test]
+async fn beyond_what_is_factorized_auto_takes_landmarks_where_few_are_enough() {
+    let server = Server::with_flags(&["--max-dense-points", "1000"]).await;
+    let points = fibonacci_sphere(3000);
+    let values: Vec<f64> = points.iter().map(|x| (2.0 * x[0]).sin()).collect();
+    let chosen = |kernel: Value| {
+        let body = json!({"cloud": {"points": points}, "values": values, "queries": [[0.0, 0.0, 1.0]],
+            "alpha": 1e-4, "kernel": kernel, "include": ["variance"]});
+        let server = &server;
+        async move {
+            let answer = server.post("/v1/posterior", &body).await.expect_ok();
+            ["solver", "solver_reason"]
+                .map(|member| answer["diagnostics"][member].as_str().unwrap().to_owned())
+        }
+    };
+    let [solver, reason] = chosen(smooth()).await;
+    assert!(solver == "landmark" && reason.contains("few landmarks"), "{solver}: {reason}");
+    for kernel in [rough(), json!({"family": "gauss", "length_scale": 0.05}), json!({"family": "gauss"})] {
+        let [solver, reason] = chosen(kernel.clone()).await;
+        assert!(solver == "local" && reason.contains("more points"), "{kernel}: {solver}: {reason}");
+    }
+}
+
+#[tokio::test]
+async fn kernels_that_need_too_many_landmarks_are_refused_with_a_remedy() {
+    let server = Server::start().await;
+    let points = fibonacci_sphere(3000);
+    let values: Vec<f64> = points.iter().map(|x| x[0]).collect();
+    let body = json!({"cloud": {"points": points}, "values": values, "queries": [[0.0, 0.0, 1.0]],
+        "solver": "landmark", "alpha": 1e-6, "kernel": {"family": "laplace", "length_scale": 1.0, "epsilon": 0.0}});
+    let problem = server.post("/v1/interpolation", &body).await.expect_problem(422, "unsupported-by-solver");
+    assert!(problem["detail"].as_str().unwrap().contains("longer length scale"), "{problem}");
+}
+
+#[tokio::test]
+async fn eight_equal_requests_are_answered_alike() {
+    let server = Server::start().await;
+    let more = json!({"values": true, "queries": [[0.6, 0.8, 0.0]]});
+    for body in [body("landmark", &smooth(), &more), body("iterative", &rough(), &more)] {
+        let asked = (0..8).map(|_| server.post("/v1/interpolation", &body));
+        let answers = futures_util::future::join_all(asked).await;
+        let values: Vec<Value> = answers.into_iter().map(|of| of.expect_ok()["values"].clone()).collect();
+        assert!(values.iter().all(|value| *value == values[0]));
+    }
+}
