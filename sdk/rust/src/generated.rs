@@ -310,6 +310,9 @@ mean. The diagnostics repeat all of it.*/
         ///The function whose level set is the surface. Default: `auto`.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub surface: ::std::option::Option<SurfaceChoice>,
+        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub tolerance: ::std::option::Option<f64>,
     }
     impl CurvaturesRequest {
         pub fn builder() -> builder::CurvaturesRequest {
@@ -482,6 +485,9 @@ has no answer.*/
         ///What local regressions learned of the cloud, or were given.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub hyperparameters: ::std::option::Option<Hyperparameters>,
+        ///Number of iterations. Only with the solver `iterative`.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub iterations: ::std::option::Option<u64>,
         ///The kernel used, with all parameters.
         pub kernel: KernelUsed,
         /**The mean of the function: the constant, then a slope per coordinate if it is linear. Absent if the
@@ -531,8 +537,8 @@ Y = 1.*/
         ///Number of rows of a sparse operator by how their weights were computed.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub stencils: ::std::option::Option<StencilsUsed>,
-        /**What the landmarks were to leave of the diagonal at most: a millionth of the noise or less. Only with
-the solver `landmark`.*/
+        /**With the solver `landmark`, what was to be left of the diagonal at most: a millionth of the noise or
+less. With `iterative`, the largest relative residual that was allowed.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub tolerance: ::std::option::Option<f64>,
         ///Changes that were made, and limits of the accuracy.
@@ -925,6 +931,9 @@ mean. The diagnostics repeat all of it.*/
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
+        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub tolerance: ::std::option::Option<f64>,
         /**Lists of values. Each has a value per point, in the order of the points.
 
 All lists have kernel and noise in common.*/
@@ -1024,6 +1033,9 @@ mean. The diagnostics repeat all of it.*/
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
+        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub tolerance: ::std::option::Option<f64>,
         ///The values at the points, in their order.
         pub values: ::std::vec::Vec<f64>,
     }
@@ -1476,6 +1488,9 @@ cloud.*/
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
+        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub tolerance: ::std::option::Option<f64>,
     }
     impl LaplaceBeltramiMatrixRequest {
         pub fn builder() -> builder::LaplaceBeltramiMatrixRequest {
@@ -1544,6 +1559,9 @@ mean. The diagnostics repeat all of it.*/
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
+        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub tolerance: ::std::option::Option<f64>,
         ///The values at the points of `cloud`, in their order.
         pub values: ::std::vec::Vec<f64>,
     }
@@ -1612,6 +1630,9 @@ mean. The diagnostics repeat all of it.*/
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
+        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub tolerance: ::std::option::Option<f64>,
     }
     impl LaplaceBeltramiSparseMatrixRequest {
         pub fn builder() -> builder::LaplaceBeltramiSparseMatrixRequest {
@@ -1718,6 +1739,9 @@ points.*/
         ///The function whose level set is the surface. Default: `auto`.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub surface: ::std::option::Option<SurfaceChoice>,
+        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub tolerance: ::std::option::Option<f64>,
         /**A number for each point of the cloud. If given, a level of the function through them is meshed.
 
 Default: the surface that the cloud samples is meshed.*/
@@ -2106,6 +2130,9 @@ mean. The diagnostics repeat all of it.*/
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
+        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub tolerance: ::std::option::Option<f64>,
         ///The values at the points, in their order.
         pub values: ::std::vec::Vec<f64>,
         /**The free parameters and their bounds, at most 64 entries. Default: length scale, variance, alpha.
@@ -2226,6 +2253,9 @@ Default: 96 to 191 points that the solver chooses.*/
         ///The function whose level set is the surface. Default: `auto`.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub surface: ::std::option::Option<SurfaceChoice>,
+        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub tolerance: ::std::option::Option<f64>,
     }
     impl NormalsRequest {
         pub fn builder() -> builder::NormalsRequest {
@@ -2504,6 +2534,9 @@ An empty list counts as absent.*/
         ///The threshold of `exceedance_probabilities` for a new observation, unit of the values.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub threshold: ::std::option::Option<f64>,
+        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub tolerance: ::std::option::Option<f64>,
         /**Lists of observed values. Each has a value per point, in the order of the points.
 
 All lists have kernel and noise in common.*/
@@ -2682,6 +2715,9 @@ An empty list counts as absent.*/
         ///The threshold of `exceedance_probabilities` for a new observation, unit of the values.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub threshold: ::std::option::Option<f64>,
+        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub tolerance: ::std::option::Option<f64>,
         ///The observed values at the points, in their order.
         pub values: ::std::vec::Vec<f64>,
     }
@@ -2837,6 +2873,9 @@ mean. The diagnostics repeat all of it.*/
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
+        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub tolerance: ::std::option::Option<f64>,
     }
     impl RegionsRequest {
         pub fn builder() -> builder::RegionsRequest {
@@ -3095,6 +3134,8 @@ smaller one.*/
         Dense,
         #[serde(rename = "landmark")]
         Landmark,
+        #[serde(rename = "iterative")]
+        Iterative,
         #[serde(rename = "local")]
         Local,
     }
@@ -3104,6 +3145,7 @@ smaller one.*/
                 Self::Auto => f.write_str("auto"),
                 Self::Dense => f.write_str("dense"),
                 Self::Landmark => f.write_str("landmark"),
+                Self::Iterative => f.write_str("iterative"),
                 Self::Local => f.write_str("local"),
             }
         }
@@ -3117,6 +3159,7 @@ smaller one.*/
                 "auto" => Ok(Self::Auto),
                 "dense" => Ok(Self::Dense),
                 "landmark" => Ok(Self::Landmark),
+                "iterative" => Ok(Self::Iterative),
                 "local" => Ok(Self::Local),
                 _ => Err("invalid value".into()),
             }
@@ -3138,9 +3181,7 @@ smaller one.*/
             value.parse()
         }
     }
-    /**The solver that was used.
-
-`iterative` is reserved: no answer has it yet.*/
+    ///The solver that was used.
     #[derive(
         ::serde::Deserialize,
         ::serde::Serialize,
@@ -3347,6 +3388,9 @@ cloud.*/
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
+        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub tolerance: ::std::option::Option<f64>,
     }
     impl SurfaceGradientMatrixRequest {
         pub fn builder() -> builder::SurfaceGradientMatrixRequest {
@@ -3417,6 +3461,9 @@ mean. The diagnostics repeat all of it.*/
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
+        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub tolerance: ::std::option::Option<f64>,
         ///The values at the points of `cloud`, in their order.
         pub values: ::std::vec::Vec<f64>,
     }
@@ -3487,6 +3534,9 @@ mean. The diagnostics repeat all of it.*/
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
+        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub tolerance: ::std::option::Option<f64>,
     }
     impl SurfaceGradientSparseMatrixRequest {
         pub fn builder() -> builder::SurfaceGradientSparseMatrixRequest {
@@ -4548,6 +4598,10 @@ mean. The diagnostics repeat all of it.*/
                 ::std::option::Option<super::SurfaceChoice>,
                 ::std::string::String,
             >,
+            tolerance: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
         }
         impl ::std::default::Default for CurvaturesRequest {
             fn default() -> Self {
@@ -4563,6 +4617,7 @@ mean. The diagnostics repeat all of it.*/
                     queries: Ok(Default::default()),
                     solver: Ok(Default::default()),
                     surface: Ok(Default::default()),
+                    tolerance: Ok(Default::default()),
                 }
             }
         }
@@ -4709,6 +4764,18 @@ mean. The diagnostics repeat all of it.*/
                     });
                 self
             }
+            pub fn tolerance<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.tolerance = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for tolerance: {e}")
+                    });
+                self
+            }
         }
         impl ::std::convert::TryFrom<CurvaturesRequest> for super::CurvaturesRequest {
             type Error = super::error::ConversionError;
@@ -4727,6 +4794,7 @@ mean. The diagnostics repeat all of it.*/
                     queries: value.queries?,
                     solver: value.solver?,
                     surface: value.surface?,
+                    tolerance: value.tolerance?,
                 })
             }
         }
@@ -4744,6 +4812,7 @@ mean. The diagnostics repeat all of it.*/
                     queries: Ok(value.queries),
                     solver: Ok(value.solver),
                     surface: Ok(value.surface),
+                    tolerance: Ok(value.tolerance),
                 }
             }
         }
@@ -5180,6 +5249,10 @@ mean. The diagnostics repeat all of it.*/
                 ::std::option::Option<super::Hyperparameters>,
                 ::std::string::String,
             >,
+            iterations: ::std::result::Result<
+                ::std::option::Option<u64>,
+                ::std::string::String,
+            >,
             kernel: ::std::result::Result<super::KernelUsed, ::std::string::String>,
             mean_coefficients: ::std::result::Result<
                 ::std::vec::Vec<f64>,
@@ -5249,6 +5322,7 @@ mean. The diagnostics repeat all of it.*/
                     ),
                     geometry: Ok(Default::default()),
                     hyperparameters: Ok(Default::default()),
+                    iterations: Ok(Default::default()),
                     kernel: Err("no value supplied for kernel".to_string()),
                     mean_coefficients: Ok(Default::default()),
                     misfit: Ok(Default::default()),
@@ -5348,6 +5422,18 @@ mean. The diagnostics repeat all of it.*/
                         format!(
                             "error converting supplied value for hyperparameters: {e}"
                         )
+                    });
+                self
+            }
+            pub fn iterations<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<u64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.iterations = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for iterations: {e}")
                     });
                 self
             }
@@ -5594,6 +5680,7 @@ mean. The diagnostics repeat all of it.*/
                     factorization: value.factorization?,
                     geometry: value.geometry?,
                     hyperparameters: value.hyperparameters?,
+                    iterations: value.iterations?,
                     kernel: value.kernel?,
                     mean_coefficients: value.mean_coefficients?,
                     misfit: value.misfit?,
@@ -5624,6 +5711,7 @@ mean. The diagnostics repeat all of it.*/
                     factorization: Ok(value.factorization),
                     geometry: Ok(value.geometry),
                     hyperparameters: Ok(value.hyperparameters),
+                    iterations: Ok(value.iterations),
                     kernel: Ok(value.kernel),
                     mean_coefficients: Ok(value.mean_coefficients),
                     misfit: Ok(value.misfit),
@@ -6457,6 +6545,10 @@ mean. The diagnostics repeat all of it.*/
                 ::std::option::Option<super::SolverChoice>,
                 ::std::string::String,
             >,
+            tolerance: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
             values: ::std::result::Result<
                 ::std::vec::Vec<::std::vec::Vec<f64>>,
                 ::std::string::String,
@@ -6475,6 +6567,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: Ok(Default::default()),
                     queries: Ok(Default::default()),
                     solver: Ok(Default::default()),
+                    tolerance: Ok(Default::default()),
                     values: Err("no value supplied for values".to_string()),
                 }
             }
@@ -6604,6 +6697,18 @@ mean. The diagnostics repeat all of it.*/
                     });
                 self
             }
+            pub fn tolerance<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.tolerance = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for tolerance: {e}")
+                    });
+                self
+            }
             pub fn values<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
@@ -6634,6 +6739,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: value.noise_variances?,
                     queries: value.queries?,
                     solver: value.solver?,
+                    tolerance: value.tolerance?,
                     values: value.values?,
                 })
             }
@@ -6652,6 +6758,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: Ok(value.noise_variances),
                     queries: Ok(value.queries),
                     solver: Ok(value.solver),
+                    tolerance: Ok(value.tolerance),
                     values: Ok(value.values),
                 }
             }
@@ -6891,6 +6998,10 @@ mean. The diagnostics repeat all of it.*/
                 ::std::option::Option<super::SolverChoice>,
                 ::std::string::String,
             >,
+            tolerance: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
             values: ::std::result::Result<::std::vec::Vec<f64>, ::std::string::String>,
         }
         impl ::std::default::Default for InterpolationRequest {
@@ -6906,6 +7017,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: Ok(Default::default()),
                     queries: Ok(Default::default()),
                     solver: Ok(Default::default()),
+                    tolerance: Ok(Default::default()),
                     values: Err("no value supplied for values".to_string()),
                 }
             }
@@ -7035,6 +7147,18 @@ mean. The diagnostics repeat all of it.*/
                     });
                 self
             }
+            pub fn tolerance<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.tolerance = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for tolerance: {e}")
+                    });
+                self
+            }
             pub fn values<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
@@ -7065,6 +7189,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: value.noise_variances?,
                     queries: value.queries?,
                     solver: value.solver?,
+                    tolerance: value.tolerance?,
                     values: value.values?,
                 })
             }
@@ -7082,6 +7207,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: Ok(value.noise_variances),
                     queries: Ok(value.queries),
                     solver: Ok(value.solver),
+                    tolerance: Ok(value.tolerance),
                     values: Ok(value.values),
                 }
             }
@@ -8099,6 +8225,10 @@ mean. The diagnostics repeat all of it.*/
                 ::std::option::Option<super::SolverChoice>,
                 ::std::string::String,
             >,
+            tolerance: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
         }
         impl ::std::default::Default for LaplaceBeltramiMatrixRequest {
             fn default() -> Self {
@@ -8114,6 +8244,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: Ok(Default::default()),
                     queries: Ok(Default::default()),
                     solver: Ok(Default::default()),
+                    tolerance: Ok(Default::default()),
                 }
             }
         }
@@ -8258,6 +8389,18 @@ mean. The diagnostics repeat all of it.*/
                     });
                 self
             }
+            pub fn tolerance<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.tolerance = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for tolerance: {e}")
+                    });
+                self
+            }
         }
         impl ::std::convert::TryFrom<LaplaceBeltramiMatrixRequest>
         for super::LaplaceBeltramiMatrixRequest {
@@ -8277,6 +8420,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: value.noise_variances?,
                     queries: value.queries?,
                     solver: value.solver?,
+                    tolerance: value.tolerance?,
                 })
             }
         }
@@ -8295,6 +8439,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: Ok(value.noise_variances),
                     queries: Ok(value.queries),
                     solver: Ok(value.solver),
+                    tolerance: Ok(value.tolerance),
                 }
             }
         }
@@ -8428,6 +8573,10 @@ mean. The diagnostics repeat all of it.*/
                 ::std::option::Option<super::SolverChoice>,
                 ::std::string::String,
             >,
+            tolerance: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
             values: ::std::result::Result<::std::vec::Vec<f64>, ::std::string::String>,
         }
         impl ::std::default::Default for LaplaceBeltramiRequest {
@@ -8444,6 +8593,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: Ok(Default::default()),
                     queries: Ok(Default::default()),
                     solver: Ok(Default::default()),
+                    tolerance: Ok(Default::default()),
                     values: Err("no value supplied for values".to_string()),
                 }
             }
@@ -8589,6 +8739,18 @@ mean. The diagnostics repeat all of it.*/
                     });
                 self
             }
+            pub fn tolerance<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.tolerance = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for tolerance: {e}")
+                    });
+                self
+            }
             pub fn values<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
@@ -8620,6 +8782,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: value.noise_variances?,
                     queries: value.queries?,
                     solver: value.solver?,
+                    tolerance: value.tolerance?,
                     values: value.values?,
                 })
             }
@@ -8639,6 +8802,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: Ok(value.noise_variances),
                     queries: Ok(value.queries),
                     solver: Ok(value.solver),
+                    tolerance: Ok(value.tolerance),
                     values: Ok(value.values),
                 }
             }
@@ -8784,6 +8948,10 @@ mean. The diagnostics repeat all of it.*/
                 ::std::option::Option<super::SolverChoice>,
                 ::std::string::String,
             >,
+            tolerance: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
         }
         impl ::std::default::Default for LaplaceBeltramiSparseMatrixRequest {
             fn default() -> Self {
@@ -8797,6 +8965,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: Ok(Default::default()),
                     queries: Ok(Default::default()),
                     solver: Ok(Default::default()),
+                    tolerance: Ok(Default::default()),
                 }
             }
         }
@@ -8917,6 +9086,18 @@ mean. The diagnostics repeat all of it.*/
                     });
                 self
             }
+            pub fn tolerance<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.tolerance = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for tolerance: {e}")
+                    });
+                self
+            }
         }
         impl ::std::convert::TryFrom<LaplaceBeltramiSparseMatrixRequest>
         for super::LaplaceBeltramiSparseMatrixRequest {
@@ -8934,6 +9115,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: value.noise_variances?,
                     queries: value.queries?,
                     solver: value.solver?,
+                    tolerance: value.tolerance?,
                 })
             }
         }
@@ -8950,6 +9132,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: Ok(value.noise_variances),
                     queries: Ok(value.queries),
                     solver: Ok(value.solver),
+                    tolerance: Ok(value.tolerance),
                 }
             }
         }
@@ -9233,6 +9416,10 @@ mean. The diagnostics repeat all of it.*/
                 ::std::option::Option<super::SurfaceChoice>,
                 ::std::string::String,
             >,
+            tolerance: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
             values: ::std::result::Result<::std::vec::Vec<f64>, ::std::string::String>,
         }
         impl ::std::default::Default for LevelSetRequest {
@@ -9254,6 +9441,7 @@ mean. The diagnostics repeat all of it.*/
                     solver: Ok(Default::default()),
                     step: Ok(Default::default()),
                     surface: Ok(Default::default()),
+                    tolerance: Ok(Default::default()),
                     values: Ok(Default::default()),
                 }
             }
@@ -9461,6 +9649,18 @@ mean. The diagnostics repeat all of it.*/
                     });
                 self
             }
+            pub fn tolerance<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.tolerance = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for tolerance: {e}")
+                    });
+                self
+            }
             pub fn values<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
@@ -9496,6 +9696,7 @@ mean. The diagnostics repeat all of it.*/
                     solver: value.solver?,
                     step: value.step?,
                     surface: value.surface?,
+                    tolerance: value.tolerance?,
                     values: value.values?,
                 })
             }
@@ -9519,6 +9720,7 @@ mean. The diagnostics repeat all of it.*/
                     solver: Ok(value.solver),
                     step: Ok(value.step),
                     surface: Ok(value.surface),
+                    tolerance: Ok(value.tolerance),
                     values: Ok(value.values),
                 }
             }
@@ -10128,6 +10330,10 @@ mean. The diagnostics repeat all of it.*/
                 ::std::option::Option<super::SolverChoice>,
                 ::std::string::String,
             >,
+            tolerance: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
             values: ::std::result::Result<::std::vec::Vec<f64>, ::std::string::String>,
             vary: ::std::result::Result<
                 ::std::vec::Vec<super::FreeParameter>,
@@ -10148,6 +10354,7 @@ mean. The diagnostics repeat all of it.*/
                     restarts: Ok(Default::default()),
                     seed: Ok(Default::default()),
                     solver: Ok(Default::default()),
+                    tolerance: Ok(Default::default()),
                     values: Err("no value supplied for values".to_string()),
                     vary: Ok(Default::default()),
                 }
@@ -10292,6 +10499,18 @@ mean. The diagnostics repeat all of it.*/
                     });
                 self
             }
+            pub fn tolerance<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.tolerance = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for tolerance: {e}")
+                    });
+                self
+            }
             pub fn values<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
@@ -10335,6 +10554,7 @@ mean. The diagnostics repeat all of it.*/
                     restarts: value.restarts?,
                     seed: value.seed?,
                     solver: value.solver?,
+                    tolerance: value.tolerance?,
                     values: value.values?,
                     vary: value.vary?,
                 })
@@ -10355,6 +10575,7 @@ mean. The diagnostics repeat all of it.*/
                     restarts: Ok(value.restarts),
                     seed: Ok(value.seed),
                     solver: Ok(value.solver),
+                    tolerance: Ok(value.tolerance),
                     values: Ok(value.values),
                     vary: Ok(value.vary),
                 }
@@ -10691,6 +10912,10 @@ mean. The diagnostics repeat all of it.*/
                 ::std::option::Option<super::SurfaceChoice>,
                 ::std::string::String,
             >,
+            tolerance: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
         }
         impl ::std::default::Default for NormalsRequest {
             fn default() -> Self {
@@ -10707,6 +10932,7 @@ mean. The diagnostics repeat all of it.*/
                     sites: Ok(Default::default()),
                     solver: Ok(Default::default()),
                     surface: Ok(Default::default()),
+                    tolerance: Ok(Default::default()),
                 }
             }
         }
@@ -10865,6 +11091,18 @@ mean. The diagnostics repeat all of it.*/
                     });
                 self
             }
+            pub fn tolerance<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.tolerance = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for tolerance: {e}")
+                    });
+                self
+            }
         }
         impl ::std::convert::TryFrom<NormalsRequest> for super::NormalsRequest {
             type Error = super::error::ConversionError;
@@ -10884,6 +11122,7 @@ mean. The diagnostics repeat all of it.*/
                     sites: value.sites?,
                     solver: value.solver?,
                     surface: value.surface?,
+                    tolerance: value.tolerance?,
                 })
             }
         }
@@ -10902,6 +11141,7 @@ mean. The diagnostics repeat all of it.*/
                     sites: Ok(value.sites),
                     solver: Ok(value.solver),
                     surface: Ok(value.surface),
+                    tolerance: Ok(value.tolerance),
                 }
             }
         }
@@ -11177,6 +11417,10 @@ mean. The diagnostics repeat all of it.*/
                 ::std::option::Option<f64>,
                 ::std::string::String,
             >,
+            tolerance: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
             values: ::std::result::Result<
                 ::std::vec::Vec<::std::vec::Vec<f64>>,
                 ::std::string::String,
@@ -11197,6 +11441,7 @@ mean. The diagnostics repeat all of it.*/
                     samples: Ok(Default::default()),
                     solver: Ok(Default::default()),
                     threshold: Ok(Default::default()),
+                    tolerance: Ok(Default::default()),
                     values: Err("no value supplied for values".to_string()),
                 }
             }
@@ -11350,6 +11595,18 @@ mean. The diagnostics repeat all of it.*/
                     });
                 self
             }
+            pub fn tolerance<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.tolerance = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for tolerance: {e}")
+                    });
+                self
+            }
             pub fn values<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
@@ -11382,6 +11639,7 @@ mean. The diagnostics repeat all of it.*/
                     samples: value.samples?,
                     solver: value.solver?,
                     threshold: value.threshold?,
+                    tolerance: value.tolerance?,
                     values: value.values?,
                 })
             }
@@ -11402,6 +11660,7 @@ mean. The diagnostics repeat all of it.*/
                     samples: Ok(value.samples),
                     solver: Ok(value.solver),
                     threshold: Ok(value.threshold),
+                    tolerance: Ok(value.tolerance),
                     values: Ok(value.values),
                 }
             }
@@ -11725,6 +11984,10 @@ mean. The diagnostics repeat all of it.*/
                 ::std::option::Option<f64>,
                 ::std::string::String,
             >,
+            tolerance: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
             values: ::std::result::Result<::std::vec::Vec<f64>, ::std::string::String>,
         }
         impl ::std::default::Default for PosteriorRequest {
@@ -11742,6 +12005,7 @@ mean. The diagnostics repeat all of it.*/
                     samples: Ok(Default::default()),
                     solver: Ok(Default::default()),
                     threshold: Ok(Default::default()),
+                    tolerance: Ok(Default::default()),
                     values: Err("no value supplied for values".to_string()),
                 }
             }
@@ -11895,6 +12159,18 @@ mean. The diagnostics repeat all of it.*/
                     });
                 self
             }
+            pub fn tolerance<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.tolerance = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for tolerance: {e}")
+                    });
+                self
+            }
             pub fn values<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
@@ -11926,6 +12202,7 @@ mean. The diagnostics repeat all of it.*/
                     samples: value.samples?,
                     solver: value.solver?,
                     threshold: value.threshold?,
+                    tolerance: value.tolerance?,
                     values: value.values?,
                 })
             }
@@ -11945,6 +12222,7 @@ mean. The diagnostics repeat all of it.*/
                     samples: Ok(value.samples),
                     solver: Ok(value.solver),
                     threshold: Ok(value.threshold),
+                    tolerance: Ok(value.tolerance),
                     values: Ok(value.values),
                 }
             }
@@ -12608,6 +12886,10 @@ mean. The diagnostics repeat all of it.*/
                 ::std::option::Option<super::SolverChoice>,
                 ::std::string::String,
             >,
+            tolerance: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
         }
         impl ::std::default::Default for RegionsRequest {
             fn default() -> Self {
@@ -12621,6 +12903,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: Ok(Default::default()),
                     own: Err("no value supplied for own".to_string()),
                     solver: Ok(Default::default()),
+                    tolerance: Ok(Default::default()),
                 }
             }
         }
@@ -12741,6 +13024,18 @@ mean. The diagnostics repeat all of it.*/
                     });
                 self
             }
+            pub fn tolerance<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.tolerance = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for tolerance: {e}")
+                    });
+                self
+            }
         }
         impl ::std::convert::TryFrom<RegionsRequest> for super::RegionsRequest {
             type Error = super::error::ConversionError;
@@ -12757,6 +13052,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: value.noise_variances?,
                     own: value.own?,
                     solver: value.solver?,
+                    tolerance: value.tolerance?,
                 })
             }
         }
@@ -12772,6 +13068,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: Ok(value.noise_variances),
                     own: Ok(value.own),
                     solver: Ok(value.solver),
+                    tolerance: Ok(value.tolerance),
                 }
             }
         }
@@ -13295,6 +13592,10 @@ mean. The diagnostics repeat all of it.*/
                 ::std::option::Option<super::SolverChoice>,
                 ::std::string::String,
             >,
+            tolerance: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
         }
         impl ::std::default::Default for SurfaceGradientMatrixRequest {
             fn default() -> Self {
@@ -13309,6 +13610,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: Ok(Default::default()),
                     queries: Ok(Default::default()),
                     solver: Ok(Default::default()),
+                    tolerance: Ok(Default::default()),
                 }
             }
         }
@@ -13441,6 +13743,18 @@ mean. The diagnostics repeat all of it.*/
                     });
                 self
             }
+            pub fn tolerance<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.tolerance = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for tolerance: {e}")
+                    });
+                self
+            }
         }
         impl ::std::convert::TryFrom<SurfaceGradientMatrixRequest>
         for super::SurfaceGradientMatrixRequest {
@@ -13459,6 +13773,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: value.noise_variances?,
                     queries: value.queries?,
                     solver: value.solver?,
+                    tolerance: value.tolerance?,
                 })
             }
         }
@@ -13476,6 +13791,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: Ok(value.noise_variances),
                     queries: Ok(value.queries),
                     solver: Ok(value.solver),
+                    tolerance: Ok(value.tolerance),
                 }
             }
         }
@@ -13613,6 +13929,10 @@ mean. The diagnostics repeat all of it.*/
                 ::std::option::Option<super::SolverChoice>,
                 ::std::string::String,
             >,
+            tolerance: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
             values: ::std::result::Result<::std::vec::Vec<f64>, ::std::string::String>,
         }
         impl ::std::default::Default for SurfaceGradientRequest {
@@ -13629,6 +13949,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: Ok(Default::default()),
                     queries: Ok(Default::default()),
                     solver: Ok(Default::default()),
+                    tolerance: Ok(Default::default()),
                     values: Err("no value supplied for values".to_string()),
                 }
             }
@@ -13774,6 +14095,18 @@ mean. The diagnostics repeat all of it.*/
                     });
                 self
             }
+            pub fn tolerance<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.tolerance = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for tolerance: {e}")
+                    });
+                self
+            }
             pub fn values<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
@@ -13805,6 +14138,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: value.noise_variances?,
                     queries: value.queries?,
                     solver: value.solver?,
+                    tolerance: value.tolerance?,
                     values: value.values?,
                 })
             }
@@ -13824,6 +14158,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: Ok(value.noise_variances),
                     queries: Ok(value.queries),
                     solver: Ok(value.solver),
+                    tolerance: Ok(value.tolerance),
                     values: Ok(value.values),
                 }
             }
@@ -13973,6 +14308,10 @@ mean. The diagnostics repeat all of it.*/
                 ::std::option::Option<super::SolverChoice>,
                 ::std::string::String,
             >,
+            tolerance: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
         }
         impl ::std::default::Default for SurfaceGradientSparseMatrixRequest {
             fn default() -> Self {
@@ -13986,6 +14325,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: Ok(Default::default()),
                     queries: Ok(Default::default()),
                     solver: Ok(Default::default()),
+                    tolerance: Ok(Default::default()),
                 }
             }
         }
@@ -14106,6 +14446,18 @@ mean. The diagnostics repeat all of it.*/
                     });
                 self
             }
+            pub fn tolerance<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.tolerance = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for tolerance: {e}")
+                    });
+                self
+            }
         }
         impl ::std::convert::TryFrom<SurfaceGradientSparseMatrixRequest>
         for super::SurfaceGradientSparseMatrixRequest {
@@ -14123,6 +14475,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: value.noise_variances?,
                     queries: value.queries?,
                     solver: value.solver?,
+                    tolerance: value.tolerance?,
                 })
             }
         }
@@ -14139,6 +14492,7 @@ mean. The diagnostics repeat all of it.*/
                     noise_variances: Ok(value.noise_variances),
                     queries: Ok(value.queries),
                     solver: Ok(value.solver),
+                    tolerance: Ok(value.tolerance),
                 }
             }
         }

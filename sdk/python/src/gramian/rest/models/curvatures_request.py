@@ -41,6 +41,7 @@ class CurvaturesRequest:
         noise_variances (list[float] | Unset): The variance of the noise at each point, instead of `alpha`. An empty
             list counts as absent.
         solver (SolverChoice | Unset): The method that solves the linear system.
+        tolerance (float | Unset): The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
         duplicates (DuplicatePolicy | Unset): The treatment of points that coincide when alpha is 0.
         queries (list[list[float]] | Unset): The points to compute at, one row of coordinates each. Default: the points
             of the cloud.
@@ -57,6 +58,7 @@ class CurvaturesRequest:
     alpha: float | Unset = UNSET
     noise_variances: list[float] | Unset = UNSET
     solver: SolverChoice | Unset = UNSET
+    tolerance: float | Unset = UNSET
     duplicates: DuplicatePolicy | Unset = UNSET
     queries: list[list[float]] | Unset = UNSET
     surface: SurfaceChoice | Unset = UNSET
@@ -82,6 +84,8 @@ class CurvaturesRequest:
         solver: str | Unset = UNSET
         if not isinstance(self.solver, Unset):
             solver = self.solver.value
+
+        tolerance = self.tolerance
 
         duplicates: str | Unset = UNSET
         if not isinstance(self.duplicates, Unset):
@@ -129,6 +133,8 @@ class CurvaturesRequest:
             field_dict["noise_variances"] = noise_variances
         if solver is not UNSET:
             field_dict["solver"] = solver
+        if tolerance is not UNSET:
+            field_dict["tolerance"] = tolerance
         if duplicates is not UNSET:
             field_dict["duplicates"] = duplicates
         if queries is not UNSET:
@@ -170,6 +176,8 @@ class CurvaturesRequest:
             solver = UNSET
         else:
             solver = SolverChoice(_solver)
+
+        tolerance = d.pop("tolerance", UNSET)
 
         _duplicates = d.pop("duplicates", UNSET)
         duplicates: DuplicatePolicy | Unset
@@ -223,6 +231,7 @@ class CurvaturesRequest:
             alpha=alpha,
             noise_variances=noise_variances,
             solver=solver,
+            tolerance=tolerance,
             duplicates=duplicates,
             queries=queries,
             surface=surface,

@@ -32,8 +32,6 @@ class Diagnostics:
         kernel (KernelUsed): The kernel that was used, with every number. Sent back as `kernel`, it gives the same
             answer.
         solver (SolverUsed): The solver that was used.
-
-            `iterative` is reserved: no answer has it yet.
         factorization (FactorizationUsed): The factorization of the Gram matrix.
 
             `bunch_kaufman`, `partial_pivoting_lu` and `conjugate_gradients` are reserved: no answer has them yet.
@@ -45,9 +43,10 @@ class Diagnostics:
         remaining_diagonal (float | Unset): Largest entry of the diagonal of K that the landmarks leave, over all
             points. Only with the solver
             `landmark`.
-        tolerance (float | Unset): What the landmarks were to leave of the diagonal at most: a millionth of the noise or
-            less. Only with
-            the solver `landmark`.
+        tolerance (float | Unset): With the solver `landmark`, what was to be left of the diagonal at most: a millionth
+            of the noise or
+            less. With `iterative`, the largest relative residual that was allowed.
+        iterations (int | Unset): Number of iterations. Only with the solver `iterative`.
         reciprocal_condition (float | Unset): Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): roughly the fraction of digits
             that survive. For landmarks,
             that of their normal equations.
@@ -86,6 +85,7 @@ class Diagnostics:
     rank: int | Unset = UNSET
     remaining_diagonal: float | Unset = UNSET
     tolerance: float | Unset = UNSET
+    iterations: int | Unset = UNSET
     reciprocal_condition: float | Unset = UNSET
     relative_residual: float | Unset = UNSET
     native_norm_squared: float | Unset = UNSET
@@ -131,6 +131,8 @@ class Diagnostics:
         remaining_diagonal = self.remaining_diagonal
 
         tolerance = self.tolerance
+
+        iterations = self.iterations
 
         reciprocal_condition = self.reciprocal_condition
 
@@ -185,6 +187,8 @@ class Diagnostics:
             field_dict["remaining_diagonal"] = remaining_diagonal
         if tolerance is not UNSET:
             field_dict["tolerance"] = tolerance
+        if iterations is not UNSET:
+            field_dict["iterations"] = iterations
         if reciprocal_condition is not UNSET:
             field_dict["reciprocal_condition"] = reciprocal_condition
         if relative_residual is not UNSET:
@@ -249,6 +253,8 @@ class Diagnostics:
 
         tolerance = d.pop("tolerance", UNSET)
 
+        iterations = d.pop("iterations", UNSET)
+
         reciprocal_condition = d.pop("reciprocal_condition", UNSET)
 
         relative_residual = d.pop("relative_residual", UNSET)
@@ -299,6 +305,7 @@ class Diagnostics:
             rank=rank,
             remaining_diagonal=remaining_diagonal,
             tolerance=tolerance,
+            iterations=iterations,
             reciprocal_condition=reciprocal_condition,
             relative_residual=relative_residual,
             native_norm_squared=native_norm_squared,

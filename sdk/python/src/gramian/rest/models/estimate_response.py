@@ -19,8 +19,6 @@ class EstimateResponse:
     Attributes:
         operation (str): The operation, repeated.
         solver (SolverUsed): The solver that was used.
-
-            `iterative` is reserved: no answer has it yet.
         flops (float): Number of floating-point operations, counted beforehand.
         bytes_ (int): Memory that the request would need beside what is held already, bytes.
         seconds (float): Expected seconds from the request's turn in the queue to its answer.

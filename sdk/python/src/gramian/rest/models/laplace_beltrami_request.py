@@ -42,6 +42,7 @@ class LaplaceBeltramiRequest:
         noise_variances (list[float] | Unset): The variance of the noise at each point, instead of `alpha`. An empty
             list counts as absent.
         solver (SolverChoice | Unset): The method that solves the linear system.
+        tolerance (float | Unset): The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
         duplicates (DuplicatePolicy | Unset): The treatment of points that coincide when alpha is 0.
         mean (MeanChoice | Unset): The mean of a function: its part beside the kernel, which it tends to far from the
             points.
@@ -62,6 +63,7 @@ class LaplaceBeltramiRequest:
     alpha: float | Unset = UNSET
     noise_variances: list[float] | Unset = UNSET
     solver: SolverChoice | Unset = UNSET
+    tolerance: float | Unset = UNSET
     duplicates: DuplicatePolicy | Unset = UNSET
     mean: MeanChoice | Unset = UNSET
     queries: list[list[float]] | Unset = UNSET
@@ -89,6 +91,8 @@ class LaplaceBeltramiRequest:
         solver: str | Unset = UNSET
         if not isinstance(self.solver, Unset):
             solver = self.solver.value
+
+        tolerance = self.tolerance
 
         duplicates: str | Unset = UNSET
         if not isinstance(self.duplicates, Unset):
@@ -137,6 +141,8 @@ class LaplaceBeltramiRequest:
             field_dict["noise_variances"] = noise_variances
         if solver is not UNSET:
             field_dict["solver"] = solver
+        if tolerance is not UNSET:
+            field_dict["tolerance"] = tolerance
         if duplicates is not UNSET:
             field_dict["duplicates"] = duplicates
         if mean is not UNSET:
@@ -181,6 +187,8 @@ class LaplaceBeltramiRequest:
             solver = UNSET
         else:
             solver = SolverChoice(_solver)
+
+        tolerance = d.pop("tolerance", UNSET)
 
         _duplicates = d.pop("duplicates", UNSET)
         duplicates: DuplicatePolicy | Unset
@@ -235,6 +243,7 @@ class LaplaceBeltramiRequest:
             alpha=alpha,
             noise_variances=noise_variances,
             solver=solver,
+            tolerance=tolerance,
             duplicates=duplicates,
             mean=mean,
             queries=queries,

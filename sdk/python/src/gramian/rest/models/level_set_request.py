@@ -44,6 +44,7 @@ class LevelSetRequest:
         noise_variances (list[float] | Unset): The variance of the noise at each point, instead of `alpha`. An empty
             list counts as absent.
         solver (SolverChoice | Unset): The method that solves the linear system.
+        tolerance (float | Unset): The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
         duplicates (DuplicatePolicy | Unset): The treatment of points that coincide when alpha is 0.
         values (list[float] | Unset): A number for each point of the cloud. If given, a level of the function through
             them is meshed.
@@ -72,6 +73,7 @@ class LevelSetRequest:
     alpha: float | Unset = UNSET
     noise_variances: list[float] | Unset = UNSET
     solver: SolverChoice | Unset = UNSET
+    tolerance: float | Unset = UNSET
     duplicates: DuplicatePolicy | Unset = UNSET
     values: list[float] | Unset = UNSET
     mean: MeanChoice | Unset = UNSET
@@ -103,6 +105,8 @@ class LevelSetRequest:
         solver: str | Unset = UNSET
         if not isinstance(self.solver, Unset):
             solver = self.solver.value
+
+        tolerance = self.tolerance
 
         duplicates: str | Unset = UNSET
         if not isinstance(self.duplicates, Unset):
@@ -164,6 +168,8 @@ class LevelSetRequest:
             field_dict["noise_variances"] = noise_variances
         if solver is not UNSET:
             field_dict["solver"] = solver
+        if tolerance is not UNSET:
+            field_dict["tolerance"] = tolerance
         if duplicates is not UNSET:
             field_dict["duplicates"] = duplicates
         if values is not UNSET:
@@ -218,6 +224,8 @@ class LevelSetRequest:
             solver = UNSET
         else:
             solver = SolverChoice(_solver)
+
+        tolerance = d.pop("tolerance", UNSET)
 
         _duplicates = d.pop("duplicates", UNSET)
         duplicates: DuplicatePolicy | Unset
@@ -291,6 +299,7 @@ class LevelSetRequest:
             alpha=alpha,
             noise_variances=noise_variances,
             solver=solver,
+            tolerance=tolerance,
             duplicates=duplicates,
             values=values,
             mean=mean,

@@ -41,6 +41,7 @@ class RegionsRequest:
             noise_variances (list[float] | Unset): The variance of the noise at each point, instead of `alpha`. An empty
                 list counts as absent.
             solver (SolverChoice | Unset): The method that solves the linear system.
+            tolerance (float | Unset): The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
             duplicates (DuplicatePolicy | Unset): The treatment of points that coincide when alpha is 0.
             coarse (list[int] | Unset): The points that belong to the coarse cloud, likewise. Default: none.
             hyperparameters (Hyperparameters | Unset): What local regressions learned of a cloud.
@@ -54,6 +55,7 @@ class RegionsRequest:
     alpha: float | Unset = UNSET
     noise_variances: list[float] | Unset = UNSET
     solver: SolverChoice | Unset = UNSET
+    tolerance: float | Unset = UNSET
     duplicates: DuplicatePolicy | Unset = UNSET
     coarse: list[int] | Unset = UNSET
     hyperparameters: Hyperparameters | Unset = UNSET
@@ -78,6 +80,8 @@ class RegionsRequest:
         solver: str | Unset = UNSET
         if not isinstance(self.solver, Unset):
             solver = self.solver.value
+
+        tolerance = self.tolerance
 
         duplicates: str | Unset = UNSET
         if not isinstance(self.duplicates, Unset):
@@ -107,6 +111,8 @@ class RegionsRequest:
             field_dict["noise_variances"] = noise_variances
         if solver is not UNSET:
             field_dict["solver"] = solver
+        if tolerance is not UNSET:
+            field_dict["tolerance"] = tolerance
         if duplicates is not UNSET:
             field_dict["duplicates"] = duplicates
         if coarse is not UNSET:
@@ -145,6 +151,8 @@ class RegionsRequest:
         else:
             solver = SolverChoice(_solver)
 
+        tolerance = d.pop("tolerance", UNSET)
+
         _duplicates = d.pop("duplicates", UNSET)
         duplicates: DuplicatePolicy | Unset
         if isinstance(_duplicates, Unset):
@@ -168,6 +176,7 @@ class RegionsRequest:
             alpha=alpha,
             noise_variances=noise_variances,
             solver=solver,
+            tolerance=tolerance,
             duplicates=duplicates,
             coarse=coarse,
             hyperparameters=hyperparameters,

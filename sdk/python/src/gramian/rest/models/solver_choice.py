@@ -4,6 +4,7 @@ from enum import StrEnum
 class SolverChoice(StrEnum):
     AUTO = "auto"
     DENSE = "dense"
+    ITERATIVE = "iterative"
     LANDMARK = "landmark"
     LOCAL = "local"
 

@@ -40,6 +40,7 @@ class SurfaceGradientMatrixRequest:
         noise_variances (list[float] | Unset): The variance of the noise at each point, instead of `alpha`. An empty
             list counts as absent.
         solver (SolverChoice | Unset): The method that solves the linear system.
+        tolerance (float | Unset): The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
         duplicates (DuplicatePolicy | Unset): The treatment of points that coincide when alpha is 0.
         queries (list[list[float]] | Unset): The points to compute rows for, one row of each matrix. Default: the points
             of the surface's
@@ -59,6 +60,7 @@ class SurfaceGradientMatrixRequest:
     alpha: float | Unset = UNSET
     noise_variances: list[float] | Unset = UNSET
     solver: SolverChoice | Unset = UNSET
+    tolerance: float | Unset = UNSET
     duplicates: DuplicatePolicy | Unset = UNSET
     queries: list[list[float]] | Unset = UNSET
     geometry: Geometry | Unset = UNSET
@@ -83,6 +85,8 @@ class SurfaceGradientMatrixRequest:
         solver: str | Unset = UNSET
         if not isinstance(self.solver, Unset):
             solver = self.solver.value
+
+        tolerance = self.tolerance
 
         duplicates: str | Unset = UNSET
         if not isinstance(self.duplicates, Unset):
@@ -123,6 +127,8 @@ class SurfaceGradientMatrixRequest:
             field_dict["noise_variances"] = noise_variances
         if solver is not UNSET:
             field_dict["solver"] = solver
+        if tolerance is not UNSET:
+            field_dict["tolerance"] = tolerance
         if duplicates is not UNSET:
             field_dict["duplicates"] = duplicates
         if queries is not UNSET:
@@ -163,6 +169,8 @@ class SurfaceGradientMatrixRequest:
             solver = UNSET
         else:
             solver = SolverChoice(_solver)
+
+        tolerance = d.pop("tolerance", UNSET)
 
         _duplicates = d.pop("duplicates", UNSET)
         duplicates: DuplicatePolicy | Unset
@@ -207,6 +215,7 @@ class SurfaceGradientMatrixRequest:
             alpha=alpha,
             noise_variances=noise_variances,
             solver=solver,
+            tolerance=tolerance,
             duplicates=duplicates,
             queries=queries,
             geometry=geometry,

@@ -39,6 +39,7 @@ class SurfaceGradientSparseMatrixRequest:
         noise_variances (list[float] | Unset): The variance of the noise at each point, instead of `alpha`. An empty
             list counts as absent.
         solver (SolverChoice | Unset): The method that solves the linear system.
+        tolerance (float | Unset): The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
         duplicates (DuplicatePolicy | Unset): The treatment of points that coincide when alpha is 0.
         queries (list[list[float]] | Unset): The points to compute rows for, one row of each matrix. Default: the points
             of the surface.
@@ -55,6 +56,7 @@ class SurfaceGradientSparseMatrixRequest:
     alpha: float | Unset = UNSET
     noise_variances: list[float] | Unset = UNSET
     solver: SolverChoice | Unset = UNSET
+    tolerance: float | Unset = UNSET
     duplicates: DuplicatePolicy | Unset = UNSET
     queries: list[list[float]] | Unset = UNSET
     geometry: Geometry | Unset = UNSET
@@ -78,6 +80,8 @@ class SurfaceGradientSparseMatrixRequest:
         solver: str | Unset = UNSET
         if not isinstance(self.solver, Unset):
             solver = self.solver.value
+
+        tolerance = self.tolerance
 
         duplicates: str | Unset = UNSET
         if not isinstance(self.duplicates, Unset):
@@ -114,6 +118,8 @@ class SurfaceGradientSparseMatrixRequest:
             field_dict["noise_variances"] = noise_variances
         if solver is not UNSET:
             field_dict["solver"] = solver
+        if tolerance is not UNSET:
+            field_dict["tolerance"] = tolerance
         if duplicates is not UNSET:
             field_dict["duplicates"] = duplicates
         if queries is not UNSET:
@@ -153,6 +159,8 @@ class SurfaceGradientSparseMatrixRequest:
         else:
             solver = SolverChoice(_solver)
 
+        tolerance = d.pop("tolerance", UNSET)
+
         _duplicates = d.pop("duplicates", UNSET)
         duplicates: DuplicatePolicy | Unset
         if isinstance(_duplicates, Unset):
@@ -189,6 +197,7 @@ class SurfaceGradientSparseMatrixRequest:
             alpha=alpha,
             noise_variances=noise_variances,
             solver=solver,
+            tolerance=tolerance,
             duplicates=duplicates,
             queries=queries,
             geometry=geometry,
