@@ -20,7 +20,7 @@ async fn every_type_of_problem_has_a_page() {
     let slugs = [
         "malformed-request malformed-json malformed-body invalid-request invalid-cloud duplicate-points",
         "dimension-mismatch length-mismatch kernel-not-smooth kernel-not-positive-definite not-positive-definite",
-        "unsupported-by-solver unknown-cloud unknown-job not-found method-not-allowed not-acceptable",
+        "not-converged unsupported-by-solver unknown-cloud unknown-job not-found method-not-allowed not-acceptable",
         "unsupported-media-type request-timeout body-too-large problem-too-large unauthorized rate-limited",
         "overloaded deadline-exceeded internal",
     ];
