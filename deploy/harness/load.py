@@ -15,8 +15,8 @@ import numpy as np
 
 N_CLIENTS = 8
 N_POINTS, N_MANY_POINTS = 120, 1500
-# Number of points of a request that takes seconds of work, and half of the memory of a replica here. A replica learns
-# after a second that a client has ended its half of a connection.
+# Number of points of a request that takes seconds of work, and half of the memory of a replica here. A
+# replica learns after a second that a client has ended its half of a connection.
 N_LONG_POINTS = 11_000
 FIT = {"kernel": gramian.Kernel("matern", length_scale=0.4), "alpha": 1e-6}
 FIT_IN_JSON = {"kernel": {"family": "matern", "length_scale": 0.4}, "alpha": 1e-6}

@@ -70,6 +70,11 @@ class Dragon:
                 np.save(file, array)
         return Cloud(*(np.load(file) for file in files))
 
+    def agreement(self, level: int) -> Floats:
+        """Returns how far the faces at each point of a scan agree: the length of the sum of their normals over their area."""
+        _, sums, areas = of_mesh(*self.mesh(level))
+        return np.linalg.norm(sums, axis=1) / np.where(areas > 0, areas, 1)
+
     def mesh(self, level: int) -> tuple[Floats, NDArray[np.int64]]:
         """Returns vertices and triangles."""
         return read_ply(self._text(level))

@@ -57,8 +57,8 @@ struct Column {
     reached_at: usize,
 }
 
-/// Solves for columns `[n, k]` until each residual is at most `tolerance` of its right-hand side, or no longer
-/// falls: the caller sees to which.
+/// Solves for columns `[n, k]` until each residual is at most `tolerance` of its right-hand side, or no
+/// longer falls: the caller sees to which.
 ///
 /// # Errors
 /// Returns the errors of the matrix.

@@ -140,8 +140,8 @@ impl Solver {
     /// `ln det(K + αI)`.
     ///
     /// # Errors
-    /// Returns the errors of [`Solver::whiten_in_place`], and [`NumericsError::Unsupported`] for a solver that
-    /// does not know it.
+    /// Returns the errors of [`Solver::whiten_in_place`], and [`NumericsError::Unsupported`] for a solver
+    /// that does not know it.
     pub(crate) fn log_determinant(&self) -> Result<f64> {
         match &self.factorization {
             Factorization::Landmark(landmarks) => Ok(landmarks.log_determinant()),

@@ -1,8 +1,8 @@
 //! Conjugate gradients on the true system, for rough kernels.
 //!
-//! The spectrum of a rough kernel's matrix does not collapse, so that few landmarks do not span it. But a value
-//! depends on its near ones alone where these are known (the screening effect). So a sparse factor of the
-//! inverse preconditions well: each point in a random order is given its nearest of those before it, and
+//! The spectrum of a rough kernel's matrix does not collapse, so that few landmarks do not span it. But a
+//! value depends on its near ones alone where these are known (the screening effect). So a sparse factor of
+//! the inverse preconditions well: each point in a random order is given its nearest of those before it, and
 //!
 //! ```text
 //! (K + D)⁻¹ ≈ UUᵀ,   U[S, i] = A_S⁻¹e_i / √(e_iᵀA_S⁻¹e_i),   A = K + D,   S: i with those it is given

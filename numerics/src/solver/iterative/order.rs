@@ -23,8 +23,8 @@ const GROWTH: f64 = 1.25;
 pub(super) struct Order {
     /// Indices of the points.
     pub points: Vec<u32>,
-    /// Places in this order of the points that each is given, `[n, GIVEN]`, the nearest first. The first points
-    /// have fewer: their rows end with their own place.
+    /// Places in this order of the points that each is given, `[n, GIVEN]`, the nearest first. The first
+    /// points have fewer: their rows end with their own place.
     pub given: Vec<u32>,
 }
 

@@ -16,7 +16,8 @@ pub(crate) fn iterative_price(n_points: usize, dimension: usize) -> Price {
     Price::of_numbers(n_points.saturating_mul(numbers), n_points as f64 * flops)
 }
 
-/// The price of weights for new values: a pass over half of the pairs for each iteration, and for the residual.
+/// The price of weights for new values: a pass over half of the pairs for each iteration, and for the
+/// residual.
 pub(crate) fn iterative_fit_price(n_points: usize, dimension: usize) -> Price {
     let n = n_points as f64;
     let flops = (EXPECTED + 1.0) * 0.5 * n * n * pair_flops(dimension, 0);

@@ -53,7 +53,7 @@ use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
 use crate::sums::expansion::Expansion;
 use normal::NormalEquations;
-use pivots::Chosen;
+use pivots::{Chosen, SAMPLE};
 pub use probe::expected_landmarks;
 pub(super) use residual::TrueResidual;
 use rows::{Coordinates, Rows};
@@ -122,17 +122,20 @@ impl Landmarks {
         let weighing = Weighing::of(system);
         let mut chosen = Chosen::among_sample(system, observer)?;
         // A look at a few points beforehand saves most of the passes over all that would be in vain.
-        let beyond = chosen.beyond_at_some(system, observer)?;
+        let beyond =
+            if system.n_points() > SAMPLE { chosen.beyond_at_some(system, observer)? } else { Vec::new() };
         if !beyond.is_empty() {
             chosen = chosen.completed(system, &beyond, observer)?;
         }
         observer.enter(Stage::Factor);
+        chosen.rows.keep(system, observer)?;
         let mut normal = NormalEquations::of(system, &chosen, &weighing, observer)?;
         for _ in 0..ROUNDS {
             if normal.beyond.is_empty() {
                 break;
             }
             chosen = chosen.completed(system, &normal.beyond, observer)?;
+            chosen.rows.keep(system, observer)?;
             normal = NormalEquations::of(system, &chosen, &weighing, observer)?;
         }
         let NormalEquations { inner, of_one, remaining, .. } = normal;
@@ -413,7 +416,10 @@ impl Landmarks {
     /// Bytes held on the heap, without the cloud.
     pub(super) fn n_bytes(&self) -> usize {
         let square = self.rank() * self.rank() * size_of::<f64>();
-        2 * square + vec_bytes(&self.weighing.weights) + self.rows.cloud().n_bytes()
+        2 * square
+            + vec_bytes(&self.weighing.weights)
+            + self.rows.cloud().n_bytes()
+            + self.rows.n_bytes_kept()
     }
 }
 
@@ -427,10 +433,13 @@ impl Preconditioned for Landmarks {
     }
 
     fn precondition(&self, columns: &[f64], observer: &dyn Observer) -> Result<Vec<f64>> {
-        let (n, mut found) = (self.n_points(), columns.to_vec());
-        let k = found.len() / n;
-        self.solve_in_place(MatMut::from_column_major_slice_mut(&mut found, n, k), observer)?;
-        Ok(found)
+        let n = self.n_points();
+        let precondition = |column: &[f64]| -> Result<Vec<f64>> {
+            let unknowns = self.unknowns(column, 1, observer)?;
+            // Sums of kernels are accurate enough for a preconditioner.
+            Ok(self.weights(column, &self.sums_at_points(unknowns, observer)?))
+        };
+        Ok(columns.chunks_exact(n).map(precondition).collect::<Result<Vec<_>>>()?.concat())
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::MOST_PRECONDITIONED;
 use super::pivots::{SAMPLE, most_landmarks};
-use super::rows::BLOCK;
+use super::rows::{BLOCK, MOST_KEPT};
 use crate::machine::price::{Price, Sizes};
 use crate::sums::price::pair_flops;
 
@@ -21,6 +21,7 @@ impl LandmarkPrice {
     pub(crate) fn of(n_points: usize, dimension: usize) -> Self {
         let of_rank = |rank: usize, n_passes: f64| {
             let n_numbers = (2 * SAMPLE.min(n_points) * rank)
+                .saturating_add(MOST_KEPT.min(rank.saturating_mul(n_points)))
                 .saturating_add(4 * rank * rank + 3 * BLOCK * rank)
                 .saturating_add(n_points.saturating_mul(8 + dimension));
             Price::of_numbers(n_numbers, n_passes * n_points as f64 * (rank * rank) as f64)

@@ -14,12 +14,12 @@ const FEW: usize = 1_000;
 /// Most landmarks of a sample: the look takes the square of them for each of its points.
 const MOST: usize = 1_200;
 
-/// Growth of the landmarks from the smaller to the larger sample up to which they are expected to be few. It is 2
-/// for rough kernels, of which every point is a landmark, and falls to 1.
+/// Growth of the landmarks from the smaller to the larger sample up to which they are expected to be few. It
+/// is 2 for rough kernels, of which every point is a landmark, and falls to 1.
 const GROWTH: f64 = 1.4;
 
-/// Estimates how many landmarks all points need, from two random samples. `None` if they are as many as the points,
-/// or if there are too few points to tell.
+/// Estimates how many landmarks all points need, from two random samples. `None` if they are as many as the
+/// points, or if there are too few points to tell.
 ///
 /// # Errors
 /// [`crate::error::NumericsError::Cancelled`].

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use crate::error::Result;
 use crate::kernel::Kernel;
+use crate::machine::heap::vec_bytes;
 use crate::machine::parallelism::parallelism;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
@@ -36,7 +37,19 @@ pub(super) struct Rows {
     nodes: Nodes,
     l11: Mat<f64>,
     coordinates: Coordinates,
+    kept: Option<Kept>,
 }
+
+/// The rows of all points, where they are few.
+struct Kept {
+    /// What remains of the diagonal, `[n]`.
+    remaining: Vec<f64>,
+    /// F or M, transposed, `[r, n]`.
+    numbers: Vec<f64>,
+}
+
+/// Largest count of numbers of rows that are kept for the next pass.
+pub(super) const MOST_KEPT: usize = 4_000_000;
 
 /// The rows of some points, as columns.
 pub(super) struct Block<'a> {
@@ -48,7 +61,7 @@ pub(super) struct Block<'a> {
 
 impl Rows {
     pub(super) fn of(points: Vec<usize>, cloud: Cloud, l11: Mat<f64>, coordinates: Coordinates) -> Self {
-        Self { points, nodes: Nodes::of(&cloud), cloud: Arc::new(cloud), l11, coordinates }
+        Self { points, nodes: Nodes::of(&cloud), cloud: Arc::new(cloud), l11, coordinates, kept: None }
     }
 
     pub(super) fn coordinates(&self) -> Coordinates {
@@ -100,6 +113,26 @@ impl Rows {
         solve_upper_triangular_in_place(self.l11.transpose(), x, par);
     }
 
+    /// Keeps the rows of all points for the passes to come, if they are few.
+    ///
+    /// # Errors
+    /// [`crate::error::NumericsError::Cancelled`].
+    pub(super) fn keep(&mut self, system: &System, observer: &dyn Observer) -> Result<()> {
+        let n_numbers = self.n_landmarks() * system.n_points();
+        if self.kept.is_some() || n_numbers > MOST_KEPT {
+            return Ok(());
+        }
+        let mut numbers = vec![0.0; n_numbers];
+        let remaining = self.fill(system.kernel(), system.cloud(), &mut numbers, observer)?;
+        self.kept = Some(Kept { remaining, numbers });
+        Ok(())
+    }
+
+    /// Bytes of the rows that are kept.
+    pub(super) fn n_bytes_kept(&self) -> usize {
+        self.kept.as_ref().map_or(0, |kept| vec_bytes(&kept.remaining) + vec_bytes(&kept.numbers))
+    }
+
     /// Goes over the points in order, a block at a time.
     ///
     /// # Errors
@@ -110,6 +143,12 @@ impl Rows {
         observer: &dyn Observer,
         mut take: impl FnMut(Range<usize>, Block<'_>),
     ) -> Result<()> {
+        if let Some(Kept { remaining, numbers }) = &self.kept {
+            let rows = MatRef::from_column_major_slice(numbers, self.n_landmarks(), remaining.len());
+            observer.checkpoint()?;
+            take(0..remaining.len(), Block { remaining, rows });
+            return Ok(());
+        }
         let (cloud, kernel) = (system.cloud(), system.kernel());
         let (n, d) = (cloud.n_points(), cloud.dimension());
         let mut buffer = vec![0.0; self.n_landmarks() * BLOCK.min(n)];

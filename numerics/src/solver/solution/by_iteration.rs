@@ -16,8 +16,8 @@ const RESTARTS: usize = 3;
 const LANDMARK_TOLERANCE: f64 = 1e-11;
 
 impl Solution {
-    /// Solves on landmarks, and where they precondition the true system, goes on with that. The residual is that
-    /// of the true system in any case.
+    /// Solves on landmarks, and where they precondition the true system, goes on with that. The residual is
+    /// that of the true system in any case.
     pub(super) fn on_landmarks(
         solver: &Solver,
         landmarks: &Landmarks,
@@ -80,8 +80,8 @@ struct Iteration<'a> {
 }
 
 impl Iteration<'_> {
-    /// Iterates, again for what is left where the true residual is not that of the recurrence. The caller sees
-    /// to the residual.
+    /// Iterates, again for what is left where the true residual is not that of the recurrence. The caller
+    /// sees to the residual.
     fn run(self, solver: &Solver, values: &[f64], observer: &dyn Observer) -> Result<Solution> {
         let nothing = || vec![0.0; values.len()];
         let (mut left, mut n_iterations) = match self.weights {
