@@ -19,6 +19,7 @@ mod order;
 pub(crate) mod price;
 
 use faer::MatMut;
+use rayon::prelude::*;
 
 use super::conjugate_gradients::{Iterated, Preconditioned, SAFETY, conjugate_gradients};
 use super::system::System;
@@ -122,8 +123,13 @@ impl Preconditioned for Iterative {
         self.system.times(columns, observer)
     }
 
-    fn precondition(&self, columns: &[f64], _observer: &dyn Observer) -> Result<Vec<f64>> {
-        Ok(columns.chunks_exact(self.n_points()).flat_map(|column| self.inverse.apply(column)).collect())
+    fn precondition(&self, columns: &[f64], observer: &dyn Observer) -> Result<Vec<f64>> {
+        let apply = |column: &[f64]| {
+            observer.checkpoint()?;
+            Ok(self.inverse.apply(column))
+        };
+        let columns = columns.par_chunks_exact(self.n_points());
+        Ok(columns.map(apply).collect::<Result<Vec<_>>>()?.concat())
     }
 }
 

@@ -19,6 +19,9 @@ const SEED: u64 = 35;
 /// five of the points found is found in vain.
 const GROWTH: f64 = 1.25;
 
+/// Searches between two looks whether to stop.
+const SEARCHES: usize = 4096;
+
 /// The order of the points.
 pub(super) struct Order {
     /// Indices of the points.
@@ -45,8 +48,13 @@ impl Order {
             let end = ((first as f64 * GROWTH) as usize).max(first + GIVEN + 1).min(n);
             let searched = ordered.select(&(0..end).collect::<Vec<_>>());
             let tree = Neighbours::of(&searched, observer)?;
-            let rows = given[first * GIVEN..end * GIVEN].par_chunks_exact_mut(GIVEN).enumerate();
-            rows.for_each(|(at, row)| fill_row(&tree, searched.point(first + at), first + at, row));
+            let blocks = given[first * GIVEN..end * GIVEN].chunks_mut(SEARCHES * GIVEN).enumerate();
+            for (block, rows) in blocks {
+                observer.checkpoint()?;
+                let start = first + block * SEARCHES;
+                let rows = rows.par_chunks_exact_mut(GIVEN).enumerate();
+                rows.for_each(|(at, row)| fill_row(&tree, searched.point(start + at), start + at, row));
+            }
             first = end;
         }
         Ok(Self { points, given })
