@@ -74,7 +74,10 @@ impl Solver {
     /// solver that has some.
     pub(crate) fn expansion<'a>(&'a self, weights: &'a [f64]) -> Expansion<'a> {
         let (centres, _) = self.centres();
-        let centres = if weights.len() == self.n_points() { self.cloud() } else { centres };
+        // Only landmarks have weights of both kinds. A fallback of full rank has them in the order of its
+        // pivots.
+        let is_of_all = self.method() == Method::Landmark && weights.len() == self.n_points();
+        let centres = if is_of_all { self.cloud() } else { centres };
         Expansion { centres, kernel: self.kernel(), weights }
     }
 

@@ -485,7 +485,7 @@ has no answer.*/
         ///What local regressions learned of the cloud, or were given.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub hyperparameters: ::std::option::Option<Hyperparameters>,
-        ///Number of iterations. Only with the solver `iterative`.
+        ///Number of iterations of conjugate gradients, with the solvers `iterative` and `landmark`.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub iterations: ::std::option::Option<u64>,
         ///The kernel used, with all parameters.

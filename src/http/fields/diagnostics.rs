@@ -143,7 +143,7 @@ pub struct Diagnostics {
     /// less. With `iterative`, the largest relative residual that was allowed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
-    /// Number of iterations. Only with the solver `iterative`.
+    /// Number of iterations of conjugate gradients, with the solvers `iterative` and `landmark`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub iterations: Option<usize>,
     /// Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): roughly the fraction of digits that survive. For landmarks,

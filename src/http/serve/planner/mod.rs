@@ -259,8 +259,12 @@ impl<'a> Planner<'a> {
             return Err(local_lacks_operators("/solver"));
         }
         if fit.solver == SolverChoice::Iterative {
-            return Err(Restricted { name: "matrices", pointer: "/solver", without: &[] }
-                .refused_by(SolverKind::Iterative));
+            return Err(Restricted {
+                name: "matrices",
+                pointer: "/solver",
+                without: &[SolverKind::Iterative],
+            }
+            .refused_by(SolverKind::Iterative));
         }
         let on = self.fitted_cloud(&mut fit)?;
         let (solver, options) = (ValuesSolver::asked(of_whole(fit.solver)), FitOptions::of(fit));

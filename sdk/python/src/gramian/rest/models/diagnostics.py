@@ -46,7 +46,8 @@ class Diagnostics:
         tolerance (float | Unset): With the solver `landmark`, what was to be left of the diagonal at most: a millionth
             of the noise or
             less. With `iterative`, the largest relative residual that was allowed.
-        iterations (int | Unset): Number of iterations. Only with the solver `iterative`.
+        iterations (int | Unset): Number of iterations of conjugate gradients, with the solvers `iterative` and
+            `landmark`.
         reciprocal_condition (float | Unset): Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): roughly the fraction of digits
             that survive. For landmarks,
             that of their normal equations.
