@@ -47,7 +47,8 @@ impl Judgement<'_> {
     /// The process must have the derivatives that the functionals use.
     ///
     /// # Errors
-    /// [`NumericsError::MeanNotDetermined`], [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
+    /// [`crate::error::NumericsError::MeanNotDetermined`], [`crate::error::NumericsError::Overflow`],
+    /// [`crate::error::NumericsError::Cancelled`].
     pub(crate) fn errors(&self, functionals: &[JetFunctional], observer: &dyn Observer) -> Result<Vec<f64>> {
         let mut found = Vec::with_capacity(functionals.len());
         for block in functionals.chunks(JUDGED_AT_ONCE) {

@@ -84,7 +84,8 @@ impl Solver {
     /// squares on the pivots.
     ///
     /// # Errors
-    /// [`NumericsError::OutOfMemory`], also if it needs more than it may take. [`NumericsError::Cancelled`].
+    /// [`crate::error::NumericsError::OutOfMemory`], also if it needs more than it may take.
+    /// [`crate::error::NumericsError::Cancelled`].
     pub fn dense_in(workspace: Workspace<'_>, system: System, observer: &dyn Observer) -> Result<Self> {
         let (cloud, kernel, regularization) = (system.cloud(), system.kernel(), system.regularization());
         observer.enter(Stage::Gram);
@@ -119,8 +120,9 @@ impl Solver {
     /// It takes 3 n r² flops and O(r² + n) memory for r landmarks, and passes of 2 n r² flops for values.
     ///
     /// # Errors
-    /// [`NumericsError::RankTooLarge`] if the kernel needs too many. [`NumericsError::WeightsOverflow`],
-    /// [`NumericsError::Cancelled`].
+    /// [`crate::error::NumericsError::RankTooLarge`] if the kernel needs too many.
+    /// [`crate::error::NumericsError::WeightsOverflow`],
+    /// [`crate::error::NumericsError::Cancelled`].
     pub fn landmark(system: System, observer: &dyn Observer) -> Result<Self> {
         let landmarks = Landmarks::of(&system, observer)?;
         observer.enter(Stage::Condition);
@@ -136,7 +138,7 @@ impl Solver {
     /// It takes 512 n bytes. Values take about ten passes over all pairs of points.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
+    /// [`crate::error::NumericsError::Cancelled`].
     pub fn iterative_to(tolerance: f64, system: System, observer: &dyn Observer) -> Result<Self> {
         let iterative = Iterative::of(&system, tolerance, observer)?;
         let norm1 = system.largest_row_seen(observer)?;
@@ -218,7 +220,7 @@ impl Solver {
     /// Overwrites the columns of `[n, k]` values by weights at all points, `Λ = W Y`.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
+    /// [`crate::error::NumericsError::Cancelled`].
     pub(crate) fn solve_in_place(&self, values: MatMut<'_, f64>, observer: &dyn Observer) -> Result<()> {
         self.factorization.solve_in_place(values, observer)
     }
@@ -229,7 +231,7 @@ impl Solver {
     /// matrices.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`].
+    /// [`crate::error::NumericsError::Cancelled`].
     pub(crate) fn solve_transposed_in_place(
         &self,
         functionals: MatMut<'_, f64>,
