@@ -192,6 +192,11 @@ impl Kernel {
         self.factors().map(|factors| cloud.stretched(factors))
     }
 
+    /// Returns this kernel for a cloud in the stretched coordinates.
+    pub(crate) fn unstretched(&self) -> Self {
+        Self { axes: None, ..self.clone() }
+    }
+
     /// Bytes held on the heap.
     pub(crate) fn n_bytes(&self) -> usize {
         self.axes.as_ref().map_or(0, |axes| block_bytes(arc_payload::<Axes>()) + axes.n_bytes())

@@ -24,7 +24,7 @@ impl Random {
     }
 
     /// Returns a number uniform in [0, 1), a multiple of 2⁻⁵³.
-    fn uniform(&mut self) -> f64 {
+    pub(crate) fn uniform(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 

@@ -4,7 +4,6 @@ use rayon::prelude::*;
 
 use super::cloud::Cloud;
 use super::neighbourhoods::Neighbourhoods;
-use super::neighbours::Neighbour;
 use super::patch::Patch;
 use super::quadric::Quadric;
 use crate::error::Result;
@@ -144,8 +143,8 @@ fn width(dimension: usize) -> usize {
 ///
 /// Cubic terms of the surface tilt the frame of the principal axes. So a second quadric is fitted over the
 /// tangent plane of the first, which they do not tilt.
-fn fit(cloud: &Cloud, x: &[f64], nearest: &[Neighbour], row: &mut [f64]) -> Option<Found> {
-    let mut patch = Patch::of(cloud, x, nearest.iter().map(|found| found.point))?;
+fn fit(cloud: &Cloud, x: &[f64], nearest: &[u32], row: &mut [f64]) -> Option<Found> {
+    let mut patch = Patch::of(cloud, x, nearest.iter().map(|&point| point as usize))?;
     let first = Quadric::of(&patch)?;
     patch.turn_over(&first.slope);
     let quadric = Quadric::of(&patch)?;
@@ -168,7 +167,7 @@ fn fit(cloud: &Cloud, x: &[f64], nearest: &[Neighbour], row: &mut [f64]) -> Opti
 mod tests {
     use super::*;
     use crate::observer::Unobserved;
-    use crate::points::neighbours::Neighbours;
+    use crate::points::neighbours::{Neighbour, Neighbours};
     use crate::points::quadric::n_quadric_neighbours;
     use crate::testing::{circle, fibonacci_sphere};
 
@@ -177,6 +176,7 @@ mod tests {
         let d = cloud.dimension();
         let mut rows = vec![0.0; width(d)];
         let nearest = Neighbours::of(cloud, &Unobserved).unwrap().nearest_positions(x, count);
+        let nearest: Vec<u32> = nearest.iter().map(|found| found.point as u32).collect();
         let found = fit(cloud, x, &nearest, &mut rows).unwrap_or(Found::Nothing);
         LocalQuadrics { dimension: d, rows, found: vec![found] }
     }

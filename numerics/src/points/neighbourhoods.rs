@@ -11,8 +11,10 @@ use crate::observer::Observer;
 pub(crate) struct Neighbourhoods {
     /// Neighbours per query: the number asked for, or all positions of the cloud if it has fewer.
     count: usize,
-    /// Neighbours of each query, `[m, count]`.
-    found: Vec<Neighbour>,
+    /// The first point of each position, `[m, count]`.
+    points: Vec<u32>,
+    /// Squared distance of each query to its nearest position, `[m]`, unit L².
+    nearest: Vec<f64>,
 }
 
 impl Neighbourhoods {
@@ -28,25 +30,37 @@ impl Neighbourhoods {
     ) -> Result<Self> {
         // Every query finds equally many positions.
         let count = neighbours.nearest_positions(queries.point(0), count).len();
-        let mut found = vec![Neighbour { point: 0, squared_distance: 0.0 }; queries.n_points() * count];
-        found.par_chunks_exact_mut(count).enumerate().try_for_each_init(
+        let mut points = vec![0; queries.n_points() * count];
+        let mut nearest = vec![0.0; queries.n_points()];
+        points.par_chunks_exact_mut(count).zip(&mut nearest).enumerate().try_for_each_init(
             || (Walk::over(neighbours), Vec::new()),
-            |(walk, nearest), (query, row)| {
+            |(walk, found), (query, (row, nearest))| {
                 observer.checkpoint()?;
-                walk.points_into(queries.point(query), count, nearest);
-                row.iter_mut().zip(nearest).for_each(|(slot, found)| *slot = *found);
+                walk.points_into(queries.point(query), count, found);
+                row.iter_mut().zip(found.iter()).for_each(|(slot, found)| *slot = found.point as u32);
+                *nearest = found[0].squared_distance;
                 Ok(())
             },
         )?;
-        Ok(Self { count, found })
+        Ok(Self { count, points, nearest })
     }
 
-    pub(crate) fn around(&self, query: usize) -> &[Neighbour] {
-        &self.found[query * self.count..][..self.count]
+    /// The `count` nearest positions around each query alone, of those that are known.
+    pub(crate) fn narrowed(self, count: usize) -> Self {
+        let count = count.min(self.count);
+        let rows = self.points.chunks_exact(self.count);
+        Self { points: rows.flat_map(|row| &row[..count]).copied().collect(), count, ..self }
     }
 
+    /// The points around a query, nearest first.
+    pub(crate) fn around(&self, query: usize) -> &[u32] {
+        &self.points[query * self.count..][..self.count]
+    }
+
+    /// The nearest point of a query.
     pub(crate) fn nearest(&self, query: usize) -> Neighbour {
-        self.found[query * self.count]
+        let point = self.points[query * self.count] as usize;
+        Neighbour { point, squared_distance: self.nearest[query] }
     }
 }
 
@@ -61,7 +75,9 @@ mod tests {
             let neighbours = Neighbours::of(&cloud, &Unobserved).unwrap();
             Neighbourhoods::of(&neighbours, &cloud, count, &Unobserved).unwrap()
         };
-        (0..cloud.n_points()).map(|point| found.around(point).iter().map(|n| n.point).collect()).collect()
+        (0..cloud.n_points())
+            .map(|point| found.around(point).iter().map(|&point| point as usize).collect())
+            .collect()
     }
 
     #[test]

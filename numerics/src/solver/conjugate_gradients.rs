@@ -9,6 +9,14 @@ use crate::observer::Observer;
 /// Part of the tolerance to which a recurrence is solved. The true residual differs from it by rounding.
 pub(super) const SAFETY: f64 = 0.5;
 
+/// Part of the tolerance by which each product may change the residual, if the solution is judged by a
+/// residual that is summed afresh.
+pub(super) const SLACK: f64 = 0.05;
+
+/// Largest error of a product Ap, over the part of it along p. The length of a step is found from `pᵀAp`, and
+/// with errors of its size the residual grew.
+const OF_CURVATURE: f64 = 0.1;
+
 /// Iterations without a new smallest residual after which rounding is all that is left.
 const PATIENCE: usize = 25;
 
@@ -19,17 +27,27 @@ const MOST: usize = 500;
 pub(super) trait Preconditioned {
     fn n_points(&self) -> usize;
 
-    /// `AX` for columns `[n, k]`.
+    /// `AX` for columns `[n, k]`, each with an error of at most `accuracy` of its size.
     ///
     /// # Errors
     /// [`crate::error::NumericsError::Overflow`], [`crate::error::NumericsError::Cancelled`].
-    fn product(&self, columns: &[f64], observer: &dyn Observer) -> Result<Vec<f64>>;
+    fn product(&self, columns: &[f64], accuracy: f64, observer: &dyn Observer) -> Result<Vec<f64>>;
 
     /// `P⁻¹R` for columns `[n, k]`.
     ///
     /// # Errors
     /// [`crate::error::NumericsError::Cancelled`].
     fn precondition(&self, columns: &[f64], observer: &dyn Observer) -> Result<Vec<f64>>;
+}
+
+/// How far columns are solved.
+#[derive(Clone, Copy)]
+pub(super) struct Goal {
+    /// Largest `|b − Ax|/|b|`.
+    pub tolerance: f64,
+    /// Part of it by which each product may change the residual. As the residual falls, products may be less
+    /// exact (Simoncini and Szyld 2003).
+    pub slack: f64,
 }
 
 /// One column of `AX = B` as it was solved.
@@ -50,6 +68,8 @@ struct Column {
     direction: Vec<f64>,
     /// `rᵀP⁻¹r`.
     energy: f64,
+    /// Cosine of the angle between p and Ap, of the last step.
+    cosine: f64,
     /// |b|.
     size: f64,
     /// The smallest residual so far, and the iteration that reached it.
@@ -57,7 +77,7 @@ struct Column {
     reached_at: usize,
 }
 
-/// Solves for columns `[n, k]` until each residual is at most `tolerance` of its right-hand side, or no
+/// Solves for columns `[n, k]` until each residual is at most the tolerance of its right-hand side, or no
 /// longer falls: the caller sees to which.
 ///
 /// # Errors
@@ -65,13 +85,13 @@ struct Column {
 pub(super) fn conjugate_gradients(
     of: &dyn Preconditioned,
     right: &[f64],
-    tolerance: f64,
+    goal: Goal,
     observer: &dyn Observer,
 ) -> Result<Vec<Iterated>> {
     let n = of.n_points();
     let mut columns: Vec<Column> = right.chunks_exact(n).map(Column::new).collect();
     for iteration in 1..=MOST {
-        let is_active = |column: &&mut Column| column.is_active(tolerance, iteration);
+        let is_active = |column: &&mut Column| column.is_active(goal.tolerance, iteration);
         let mut active: Vec<&mut Column> = columns.iter_mut().filter(is_active).collect();
         if active.is_empty() {
             break;
@@ -81,7 +101,8 @@ pub(super) fn conjugate_gradients(
         let conditioned = of.precondition(&residuals, observer)?;
         active.iter_mut().zip(conditioned.chunks_exact(n)).for_each(|(column, z)| column.turn(z));
         let directions: Vec<f64> = active.iter().flat_map(|column| &column.direction).copied().collect();
-        let products = of.product(&directions, observer)?;
+        let accuracy = active.iter().map(|column| column.accuracy(goal)).fold(1.0, f64::min);
+        let products = of.product(&directions, accuracy, observer)?;
         for (column, product) in active.iter_mut().zip(products.chunks_exact(n)) {
             column.step(product, iteration);
         }
@@ -99,6 +120,7 @@ impl Column {
             residual: right.iter().map(|b| b / unit).collect(),
             direction: vec![0.0; right.len()],
             energy: f64::INFINITY,
+            cosine: 1.0,
             size,
             smallest: if size == 0.0 { 0.0 } else { 1.0 },
             reached_at: 0,
@@ -120,6 +142,11 @@ impl Column {
         self.smallest > tolerance && iteration <= self.reached_at + PATIENCE
     }
 
+    /// How exact the next product must be. The step to the next residual is hardly longer than the residual.
+    fn accuracy(&self, goal: Goal) -> f64 {
+        (goal.slack * goal.tolerance / norm(&self.residual)).min(OF_CURVATURE * self.cosine)
+    }
+
     /// Chooses the next direction from `z = P⁻¹r`.
     fn turn(&mut self, z: &[f64]) {
         let energy = dot(&self.residual, z);
@@ -131,6 +158,8 @@ impl Column {
     /// Goes along the direction p, given `Ap`.
     fn step(&mut self, product: &[f64], iteration: usize) {
         let curvature = dot(&self.direction, product);
+        let sizes = norm(&self.direction) * norm(product);
+        self.cosine = if sizes > 0.0 { curvature.abs() / sizes } else { 1.0 };
         let length = if curvature > 0.0 { self.energy / curvature } else { 0.0 };
         self.x.iter_mut().zip(&self.direction).for_each(|(x, p)| *x += length * p);
         self.residual.iter_mut().zip(product).for_each(|(r, q)| *r -= length * q);

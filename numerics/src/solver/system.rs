@@ -18,7 +18,7 @@ const ROWS_SEEN: usize = 64;
 
 /// Columns up to which products with each by itself, for which each pair of points is evaluated once, are
 /// faster than products with all.
-const FEW: usize = 2;
+pub(super) const FEW: usize = 2;
 
 /// The linear system of a fit, `(K(X, X) + αI) Λ = Y` for any values Y. Its constructor checks that a
 /// solution can exist.
@@ -101,9 +101,14 @@ impl System {
         } else {
             values_of_each(cloud, kernel, columns, cloud, observer)?
         };
-        let entries = products.iter_mut().zip(columns).enumerate();
-        entries.for_each(|(at, (product, x))| *product += self.regularization.at(at % n) * x);
+        self.add_noise(columns, &mut products);
         Ok(products)
+    }
+
+    /// Adds `αX` to products for columns `[n, k]`.
+    pub(super) fn add_noise(&self, columns: &[f64], products: &mut [f64]) {
+        let (n, entries) = (self.n_points(), products.iter_mut().zip(columns).enumerate());
+        entries.for_each(|(at, (product, x))| *product += self.regularization.at(at % n) * x);
     }
 
     pub fn n_points(&self) -> usize {

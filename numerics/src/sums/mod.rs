@@ -1,6 +1,7 @@
 //! Loops over pairs of points: Gram matrices, and sums of kernels with their derivatives.
 
 pub mod expansion;
+pub(crate) mod fast;
 pub mod gram;
 pub mod jets;
 pub(crate) mod many;

@@ -17,23 +17,29 @@ mod columns;
 mod inverse_factor;
 mod order;
 pub(crate) mod price;
+mod product;
 
 use faer::MatMut;
 use rayon::prelude::*;
 
-use super::conjugate_gradients::{Iterated, Preconditioned, SAFETY, conjugate_gradients};
+use super::conjugate_gradients::{Goal, Iterated, Preconditioned, SAFETY, conjugate_gradients};
 use super::system::System;
 use crate::error::{NumericsError, Result};
 use crate::observer::{Observer, Stage};
 use inverse_factor::InverseFactor;
+use product::Product;
 
 /// Columns that are solved together. Kernel values are computed once for all of them.
 pub(super) const SOLVED_AT_ONCE: usize = 64;
+
+/// Part of the tolerance by which each product may change a residual that is not summed afresh.
+const LITTLE_SLACK: f64 = 1e-3;
 
 /// A system with a preconditioner.
 pub(super) struct Iterative {
     system: System,
     inverse: InverseFactor,
+    product: Product,
     /// Largest relative residual of an answer.
     tolerance: f64,
 }
@@ -43,7 +49,8 @@ impl Iterative {
     /// [`NumericsError::Cancelled`].
     pub(super) fn of(system: &System, tolerance: f64, observer: &dyn Observer) -> Result<Self> {
         observer.enter(Stage::Factor);
-        Ok(Self { inverse: InverseFactor::of(system, observer)?, system: system.clone(), tolerance })
+        let inverse = InverseFactor::of(system, observer)?;
+        Ok(Self { inverse, product: Product::of(system, observer)?, system: system.clone(), tolerance })
     }
 
     pub(super) fn tolerance(&self) -> f64 {
@@ -56,7 +63,8 @@ impl Iterative {
     /// [`NumericsError::NotConverged`], [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
     fn solve(&self, right: &[f64], observer: &dyn Observer) -> Result<Vec<Iterated>> {
         let blocks = right.chunks(SOLVED_AT_ONCE * self.n_points());
-        let solve = |block| conjugate_gradients(self, block, SAFETY * self.tolerance, observer);
+        let goal = Goal { tolerance: SAFETY * self.tolerance, slack: LITTLE_SLACK };
+        let solve = |block| conjugate_gradients(self, block, goal, observer);
         let found = blocks.map(solve).collect::<Result<Vec<_>>>()?.into_iter().flatten().collect::<Vec<_>>();
         // NaN is no convergence.
         let is_met = |column: &Iterated| column.relative_residual <= self.tolerance;
@@ -110,7 +118,7 @@ impl Iterative {
     }
 
     pub(super) fn n_bytes(&self) -> usize {
-        self.inverse.n_bytes()
+        self.inverse.n_bytes() + self.product.n_bytes()
     }
 }
 
@@ -119,8 +127,8 @@ impl Preconditioned for Iterative {
         self.system.n_points()
     }
 
-    fn product(&self, columns: &[f64], observer: &dyn Observer) -> Result<Vec<f64>> {
-        self.system.times(columns, observer)
+    fn product(&self, columns: &[f64], accuracy: f64, observer: &dyn Observer) -> Result<Vec<f64>> {
+        self.product.times(&self.system, columns, accuracy, observer)
     }
 
     fn precondition(&self, columns: &[f64], observer: &dyn Observer) -> Result<Vec<f64>> {

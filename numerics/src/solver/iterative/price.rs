@@ -8,20 +8,23 @@ use crate::sums::price::pair_flops;
 /// Iterations that prices assume. Matérn kernels and Laplace take 5 to 15 to a residual of 1e-8.
 const EXPECTED: f64 = 10.0;
 
+/// Pairs that a fast product takes for each point. A tenth of it is enough for the last iterations.
+const FAST_PAIRS: f64 = 30_000.0;
+
 /// The price of the sparse factor: for each point a small factorization, and the search for its neighbours.
 pub(crate) fn iterative_price(n_points: usize, dimension: usize) -> Price {
     let n_bytes = MOST * (size_of::<f32>() + size_of::<u32>());
-    let numbers = n_bytes / size_of::<f64>() + 4 + 3 * dimension;
+    let numbers = n_bytes / size_of::<f64>() + 5 + 4 * dimension;
     let flops = (MOST as f64).powi(3) + 40.0 * (MOST * MOST) as f64 + 20_000.0;
     Price::of_numbers(n_points.saturating_mul(numbers), n_points as f64 * flops)
 }
 
-/// The price of weights for new values: a pass over half of the pairs for each iteration, and for the
-/// residual.
+/// The price of weights for new values: a product for each iteration, and a pass over half of the pairs for
+/// the residual.
 pub(crate) fn iterative_fit_price(n_points: usize, dimension: usize) -> Price {
     let n = n_points as f64;
-    let flops = (EXPECTED + 1.0) * 0.5 * n * n * pair_flops(dimension, 0);
-    Price::of_numbers(n_points.saturating_mul(8), flops)
+    let pairs = EXPECTED * n * pairs_per_point(n, 0.5) + 0.5 * n * n;
+    Price::of_numbers(n_points.saturating_mul(12), pairs * pair_flops(dimension, 0))
 }
 
 /// The price of covariances of functionals, `held` at once: each is a solve, and those of a block share their
@@ -29,7 +32,13 @@ pub(crate) fn iterative_fit_price(n_points: usize, dimension: usize) -> Price {
 pub(crate) fn iterative_covariances_price(held: usize, sizes: Sizes) -> Price {
     let Sizes { n_points, n_queries, dimension } = sizes;
     let (n, blocks) = (n_points as f64, n_queries.div_ceil(SOLVED_AT_ONCE) as f64);
-    let flops = EXPECTED * n * n * (blocks * pair_flops(dimension, 0) + 2.0 * n_queries as f64);
-    let columns = 5 * n_queries.min(held) + 8 * n_queries.min(SOLVED_AT_ONCE);
+    let of_pair = blocks * pair_flops(dimension, 0) + 2.0 * n_queries as f64;
+    let flops = EXPECTED * n * pairs_per_point(n, 1.0) * of_pair;
+    let columns = 5 * n_queries.min(held) + 12 * n_queries.min(SOLVED_AT_ONCE);
     Price::of_numbers(n_points.saturating_mul(columns), flops)
+}
+
+/// Pairs that a product takes for each point, where a plain one takes this share of all.
+fn pairs_per_point(n_points: f64, share: f64) -> f64 {
+    (share * n_points).min(FAST_PAIRS)
 }

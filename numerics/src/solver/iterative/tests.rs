@@ -111,3 +111,27 @@ fn what_cannot_be_reached_is_refused_with_what_was() {
         other => panic!("{other:?}"),
     }
 }
+
+#[test]
+fn products_are_as_exact_as_they_need_be() {
+    let of = system(torus(30_000, 6), matern(1), Regularization::uniform(1e-3).unwrap());
+    let product = Product::of(&of, &Unobserved).unwrap();
+    let values = field(of.cloud());
+    // Weights of alternating signs cancel in the sums, those of the values do not.
+    let rough = (0..30_000).map(|i| if i % 2 == 0 { 1.0 } else { -1.0 }).collect();
+    for column in [values.clone(), rough] {
+        let exact = of.times(&column, &Unobserved).unwrap();
+        for accuracy in [1e-2, 1e-5, 1e-8] {
+            let found = product.times(&of, &column, accuracy, &Unobserved).unwrap();
+            let errors: Vec<f64> = found.iter().zip(&exact).map(|(a, b)| a - b).collect();
+            // The error is measured in 128 rows.
+            assert!(
+                norm(&errors) <= 1.5 * accuracy * norm(&exact),
+                "{accuracy}: {}",
+                norm(&errors) / norm(&exact)
+            );
+        }
+    }
+    let few = iterations(system(torus(7_500, 6), matern(1), Regularization::uniform(1e-3).unwrap()), 1e-9);
+    assert!(iterations(of, 1e-9) < 2 * few);
+}

@@ -428,7 +428,7 @@ impl Preconditioned for Landmarks {
         self.system.n_points()
     }
 
-    fn product(&self, columns: &[f64], observer: &dyn Observer) -> Result<Vec<f64>> {
+    fn product(&self, columns: &[f64], _accuracy: f64, observer: &dyn Observer) -> Result<Vec<f64>> {
         self.system.times(columns, observer)
     }
 

@@ -5,7 +5,7 @@ use super::candidate::{Candidate, MAX_RELATIVE_RESIDUAL, norm2};
 use crate::error::{NotDefinite, NumericsError, Result};
 use crate::observer::Observer;
 use crate::solver::Solver;
-use crate::solver::conjugate_gradients::{Preconditioned, SAFETY, conjugate_gradients};
+use crate::solver::conjugate_gradients::{Goal, Preconditioned, SAFETY, SLACK, conjugate_gradients};
 use crate::solver::iterative::Iterative;
 use crate::solver::landmark::{Landmarks, TrueResidual};
 
@@ -93,9 +93,9 @@ impl Iteration<'_> {
             if part <= self.tolerance {
                 break;
             }
-            let tolerance = SAFETY * self.tolerance / part;
+            let goal = Goal { tolerance: SAFETY * self.tolerance / part, slack: SLACK };
             let mut weights = left.weights.clone();
-            for found in conjugate_gradients(self.of, &left.residual, tolerance, observer)? {
+            for found in conjugate_gradients(self.of, &left.residual, goal, observer)? {
                 n_iterations += found.n_iterations;
                 weights.iter_mut().zip(&found.x).for_each(|(weight, x)| *weight += x);
             }

@@ -51,17 +51,17 @@ pub(super) fn consistent_signs(
     let mut is_at_rim = directions.is_at_rim.clone();
     for edge in gaps::join_across(sampled, &directions.normals, &mut forest)? {
         // The end of a piece at a gap is no end of the surface.
-        is_at_rim[edge.a] = false;
+        is_at_rim[edge.a()] = false;
         edges.push(edge);
     }
     // Stable: the edges of a point stay nearest first.
-    edges.sort_by_key(|edge| edge.a);
+    edges.sort_by_key(|edge| edge.a());
     let found = forest.find_all();
     let pieces = Parts::of(&found);
     let relative: Vec<f64> = found.iter().map(|found| found.sign).collect();
     let scene = Scene { sampled, directions, pieces: &pieces, relative: &relative, is_at_rim: &is_at_rim };
     let (mut signs, mut has_rim) = scene.signs_by_piece(&edges);
-    let weight: f64 = edges.iter().map(|edge| edge.weight).sum();
+    let weight: f64 = edges.iter().map(|edge| edge.weight()).sum();
     let is_resolved = weight / (n * n_neighbours(sampled.cloud)) as f64 >= RESOLVED;
     let mut is_ambiguous = vec![false; n];
     if !is_resolved || contradiction(&edges, &signs) > CONTRADICTION {
@@ -79,8 +79,8 @@ pub(super) fn consistent_signs(
 pub(super) fn joined(edges: &[Edge], has_sign: &[bool]) -> SignedForest {
     let mut forest = SignedForest::new(has_sign.len());
     for edge in edges {
-        if has_sign[edge.a] && has_sign[edge.b] && edge.cosine > SAME_REGION {
-            forest.join(edge.a, edge.b, 1.0);
+        if has_sign[edge.a()] && has_sign[edge.b()] && edge.cosine() > SAME_REGION {
+            forest.join(edge.a(), edge.b(), 1.0);
         }
     }
     forest
@@ -133,10 +133,10 @@ impl Scene<'_> {
         let has_sign = &self.directions.has_sign;
         let mut opposite = vec![0.0; self.pieces.members.len()];
         let mut total = opposite.clone();
-        for edge in edges.iter().filter(|edge| has_sign[edge.a] && has_sign[edge.b]) {
-            let piece = self.pieces.of_point[edge.a];
-            total[piece] += edge.weight;
-            opposite[piece] += if edge.cosine < 0.0 { edge.weight } else { 0.0 };
+        for edge in edges.iter().filter(|edge| has_sign[edge.a()] && has_sign[edge.b()]) {
+            let piece = self.pieces.of_point[edge.a()];
+            total[piece] += edge.weight();
+            opposite[piece] += if edge.cosine() < 0.0 { edge.weight() } else { 0.0 };
         }
         let share = |(opposite, total): (f64, f64)| if total > 0.0 { opposite / total } else { 0.0 };
         opposite.into_iter().zip(total).map(share).collect()

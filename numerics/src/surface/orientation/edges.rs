@@ -6,19 +6,19 @@ use super::forest::SignedForest;
 use super::{Sampled, n_neighbours};
 use crate::machine::vector::dot;
 use crate::points::cloud::{Cloud, squared_distance};
-use crate::points::neighbours::Neighbour;
 
 /// Weight up to which two points do not count as neighbours on one sheet.
 const LEAST_WEIGHT: f64 = 0.01;
 
-/// Two neighbours on one sheet of the surface.
+/// Points whose edges are found at once.
+const BLOCK: usize = 1 << 16;
+
+/// Two neighbours on one sheet of the surface. There are several for each point, so that their bytes count.
 pub(super) struct Edge {
-    pub a: usize,
-    pub b: usize,
-    /// Cosine of the angle between the two normals.
-    pub cosine: f64,
-    /// Certainty, 0 to 1, that the surface leads from one point to the other.
-    pub weight: f64,
+    a: u32,
+    b: u32,
+    cosine: f32,
+    weight: f32,
 }
 
 impl Edge {
@@ -30,12 +30,32 @@ impl Edge {
     pub(super) fn between(cloud: &Cloud, normals: &[f64], a: usize, b: usize) -> Self {
         let cosine = cosine(cloud, normals, a, b);
         let weight = cosine * cosine * (1.0 - 2.0 * across(cloud, normals, a, b));
-        Self { a, b, cosine, weight }
+        Self { a: a as u32, b: b as u32, cosine: cosine as f32, weight: weight as f32 }
+    }
+
+    /// The first point, a.
+    pub(super) fn a(&self) -> usize {
+        self.a as usize
+    }
+
+    /// The second point, b.
+    pub(super) fn b(&self) -> usize {
+        self.b as usize
+    }
+
+    /// Cosine of the angle between the two normals.
+    pub(super) fn cosine(&self) -> f64 {
+        self.cosine.into()
+    }
+
+    /// Certainty, 0 to 1, that the surface leads from one point to the other.
+    pub(super) fn weight(&self) -> f64 {
+        self.weight.into()
     }
 
     /// Returns the weight, negative where normals with these signs are opposite.
     pub(super) fn agreement(&self, signs: &[f64]) -> f64 {
-        self.weight * (signs[self.a] * signs[self.b] * self.cosine).signum()
+        self.weight() * (signs[self.a()] * signs[self.b()] * self.cosine()).signum()
     }
 }
 
@@ -60,7 +80,14 @@ fn cosine(cloud: &Cloud, normals: &[f64], a: usize, b: usize) -> f64 {
 /// The sign of the normals does not matter.
 pub(super) fn sheet_edges(sampled: &Sampled<'_>, normals: &[f64]) -> Vec<Edge> {
     let edges_of = |a: usize| edges_around(sampled.cloud, normals, a, sampled.around.around(a));
-    (0..sampled.cloud.n_points()).into_par_iter().flat_map_iter(edges_of).collect()
+    let n = sampled.cloud.n_points();
+    // Block by block, so that they are not held twice.
+    let mut edges = Vec::with_capacity(n * n_neighbours(sampled.cloud));
+    for first in (0..n).step_by(BLOCK) {
+        let block = first..(first + BLOCK).min(n);
+        edges.extend(block.into_par_iter().flat_map_iter(edges_of).collect::<Vec<Edge>>());
+    }
+    edges
 }
 
 /// Returns the edges of [`sheet_edges`] that begin at a point. `around` has the nearest positions to it,
@@ -69,18 +96,19 @@ pub(super) fn edges_around<'a>(
     cloud: &'a Cloud,
     normals: &'a [f64],
     a: usize,
-    around: &'a [Neighbour],
+    around: &'a [u32],
 ) -> impl Iterator<Item = Edge> + 'a {
-    let elsewhere = around.iter().filter(|found| found.squared_distance > 0.0).take(n_neighbours(cloud));
-    let edges = elsewhere.map(move |found| Edge::between(cloud, normals, a, found.point));
-    edges.filter(|edge| edge.weight > LEAST_WEIGHT)
+    let is_elsewhere = move |b: &usize| squared_distance(cloud.point(a), cloud.point(*b)) > 0.0;
+    let elsewhere = around.iter().map(|&b| b as usize).filter(is_elsewhere).take(n_neighbours(cloud));
+    let edges = elsewhere.map(move |b| Edge::between(cloud, normals, a, b));
+    edges.filter(|edge| edge.weight() > LEAST_WEIGHT)
 }
 
 /// Returns the edges of a point. `edges` are ordered by first point.
 pub(super) fn edges_of(edges: &[Edge], point: usize) -> &[Edge] {
-    let start = edges.partition_point(|edge| edge.a < point);
+    let start = edges.partition_point(|edge| edge.a() < point);
     let rest = &edges[start..];
-    &rest[..rest.partition_point(|edge| edge.a == point)]
+    &rest[..rest.partition_point(|edge| edge.a() == point)]
 }
 
 /// Returns means of values `[n]` over each point and its neighbours on the sheet, `[n]`.
@@ -88,8 +116,8 @@ pub(super) fn averaged(edges: &[Edge], values: &[f64]) -> Vec<f64> {
     let mut means = values.to_vec();
     let mut counts = vec![1.0; values.len()];
     for edge in edges {
-        means[edge.a] += values[edge.b];
-        counts[edge.a] += 1.0;
+        means[edge.a()] += values[edge.b()];
+        counts[edge.a()] += 1.0;
     }
     means.iter_mut().zip(&counts).for_each(|(mean, count)| *mean /= count);
     means
@@ -97,7 +125,7 @@ pub(super) fn averaged(edges: &[Edge], values: &[f64]) -> Vec<f64> {
 
 /// Returns the share of the edges, by weight, across which normals with these signs are opposite.
 pub(super) fn contradiction(edges: &[Edge], signs: &[f64]) -> f64 {
-    let total: f64 = edges.iter().map(|edge| edge.weight).sum();
+    let total: f64 = edges.iter().map(|edge| edge.weight()).sum();
     let opposite: f64 = edges.iter().map(|edge| edge.agreement(signs).min(0.0).abs()).sum();
     if total == 0.0 { 0.0 } else { opposite / total }
 }
@@ -120,9 +148,9 @@ fn borders(forest: &mut SignedForest, edges: &[Edge]) -> Vec<Border> {
     let found = forest.find_all();
     let mut votes: Vec<Border> = Vec::new();
     for edge in edges {
-        let (a, b) = (found[edge.a], found[edge.b]);
+        let (a, b) = (found[edge.a()], found[edge.b()]);
         if a.root != b.root {
-            let vote = a.sign * b.sign * edge.cosine.signum() * edge.weight;
+            let vote = a.sign * b.sign * edge.cosine().signum() * edge.weight();
             votes.push(Border { a: a.root.min(b.root), b: a.root.max(b.root), vote });
         }
     }

@@ -60,7 +60,7 @@ pub(super) fn join_across(
     }
     let edge = |a: usize, b: usize| Edge::between(sampled.cloud, normals, a, b);
     let both = |bridge: &Bridge| [edge(bridge.gap.a, bridge.gap.b), edge(bridge.gap.b, bridge.gap.a)];
-    Ok(bridges.iter().flat_map(both).filter(|edge| edge.weight > 0.0).collect())
+    Ok(bridges.iter().flat_map(both).filter(|edge| edge.weight() > 0.0).collect())
 }
 
 /// The gap between two pieces that are joined, and their sign relative to one another.
@@ -76,7 +76,7 @@ fn bridge(sampled: &Sampled<'_>, normals: &[f64], found: &[Found], gaps: &[Gap])
     let (mut vote, mut count) = (0.0, 0.0);
     for gap in near {
         let edge = Edge::between(sampled.cloud, normals, gap.a, gap.b);
-        vote += found[gap.a].sign * found[gap.b].sign * edge.cosine.signum() * edge.weight.max(0.0);
+        vote += found[gap.a].sign * found[gap.b].sign * edge.cosine().signum() * edge.weight().max(0.0);
         count += 1.0;
     }
     (vote.abs() > SURE * count).then(|| Bridge { gap: shortest, sign: vote.signum() })

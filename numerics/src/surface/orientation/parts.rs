@@ -45,10 +45,10 @@ impl Parts {
             let (mut patch, mut at) = (vec![first], 0);
             while let Some(&point) = patch.get(at) {
                 for edge in edges_of(edges, point) {
-                    let is_free = patches.of_point[edge.b] == usize::MAX;
+                    let is_free = patches.of_point[edge.b()] == usize::MAX;
                     if is_free && patch.len() < most && edge.agreement(signs) > SURE {
-                        patches.of_point[edge.b] = patches.members.len();
-                        patch.push(edge.b);
+                        patches.of_point[edge.b()] = patches.members.len();
+                        patch.push(edge.b());
                     }
                 }
                 at += 1;

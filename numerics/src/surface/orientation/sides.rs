@@ -82,8 +82,8 @@ pub(super) fn settle(
 fn contradicted(edges: &[Edge], signs: &[f64]) -> Vec<bool> {
     let (mut weights, mut against) = (vec![0.0; signs.len()], vec![0.0; signs.len()]);
     for edge in edges {
-        weights[edge.a] += edge.weight;
-        against[edge.a] += edge.agreement(signs).min(0.0).abs();
+        weights[edge.a()] += edge.weight();
+        against[edge.a()] += edge.agreement(signs).min(0.0).abs();
     }
     weights.iter().zip(against).map(|(weight, against)| against > CONTRADICTED * weight).collect()
 }

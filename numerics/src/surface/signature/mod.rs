@@ -12,7 +12,7 @@ use std::sync::{Arc, OnceLock};
 
 use super::NearNormals;
 use super::degeneracy::is_too_rough;
-use super::orientation::{Oriented, Sampled, SurfaceOrientation};
+use super::orientation::{Oriented, Sampled, SurfaceOrientation, n_around};
 use crate::error::{NumericsError, Result};
 use crate::function::interpolant::Interpolant;
 use crate::machine::heap::{arc_payload, block_bytes, vec_bytes};
@@ -77,6 +77,7 @@ impl SignatureSurface {
         let count = n_quadric_neighbours(cloud.dimension());
         let around = Neighbourhoods::of(sampling.neighbours(), cloud, count, observer)?;
         let quadrics = LocalQuadrics::of(cloud, &around, cloud, observer)?;
+        let around = around.narrowed(n_around(cloud));
         let directions = directions(&signature, &sampling, &quadrics, observer)?;
         let sampled = Sampled { cloud, sampling: &sampling, around: &around, observer };
         let oriented = Oriented::of(&sampled, directions, &quadrics, given)?;

@@ -130,7 +130,7 @@ fn marked(points: &[usize], n: usize) -> Vec<bool> {
 fn labels(forest: &mut SignedForest, edges: &[Edge], own: &[usize]) -> Vec<Option<usize>> {
     let roots: Vec<usize> = forest.find_all().into_iter().map(|found| found.root).collect();
     let mut is_labelled = marked(own, roots.len());
-    edges.iter().for_each(|edge| is_labelled[edge.b] = true);
+    edges.iter().for_each(|edge| is_labelled[edge.b()] = true);
     let (mut label_of, mut n_labels) = (vec![None; roots.len()], 0);
     let label = |(&root, is_labelled): (&usize, bool)| {
         is_labelled.then(|| {
@@ -147,9 +147,9 @@ fn labels(forest: &mut SignedForest, edges: &[Edge], own: &[usize]) -> Vec<Optio
 fn borders(edges: &[Edge], labels: &[Option<usize>]) -> Vec<Border> {
     let mut sums = BTreeMap::<[usize; 2], [f64; 2]>::new();
     for edge in edges {
-        if let (Some(a), Some(b)) = (labels[edge.a], labels[edge.b]) {
+        if let (Some(a), Some(b)) = (labels[edge.a()], labels[edge.b()]) {
             let of_pair = sums.entry([a.min(b), a.max(b)]).or_default();
-            of_pair[usize::from(edge.cosine < 0.0)] += edge.weight;
+            of_pair[usize::from(edge.cosine() < 0.0)] += edge.weight();
         }
     }
     sums.into_iter().map(|(regions, [agreeing, opposing])| Border { regions, agreeing, opposing }).collect()

@@ -97,7 +97,7 @@ impl Problem {
         let mut place = vec![usize::MAX; parts.members.len()];
         self.unknown.iter().enumerate().for_each(|(at, &part)| place[part] = at);
         for edge in edges {
-            let (a, b) = (place[parts.of_point[edge.a]], place[parts.of_point[edge.b]]);
+            let (a, b) = (place[parts.of_point[edge.a()]], place[parts.of_point[edge.b()]]);
             if a != b && a != usize::MAX && b != usize::MAX {
                 let spring = SPRING * edge.agreement(signs);
                 self.springs[a * m + b] += spring;

@@ -117,7 +117,7 @@ fn followers(parts: &Parts, edges: &[Edge], signs: &[f64], turned: &[usize]) -> 
         (vec![false; n_parts], vec![false; n_parts], vec![0.0; n_parts]);
     turned.iter().for_each(|&part| is_turned[part] = true);
     for edge in edges {
-        let (a, b) = (parts.of_point[edge.a], parts.of_point[edge.b]);
+        let (a, b) = (parts.of_point[edge.a()], parts.of_point[edge.b()]);
         for (own, other) in [(a, b), (b, a)].into_iter().filter(|(own, other)| own != other) {
             let sign = if is_turned[other] { -1.0 } else { 1.0 };
             votes[own] += sign * edge.agreement(signs);

@@ -62,24 +62,26 @@ impl Place<'_> {
         let (cloud, d) = (self.sampled.cloud, self.sampled.cloud.dimension());
         let around = self.sampled.around.around(self.point);
         let around = &around[..around.len().min(n_neighbours(cloud) + 1)];
-        let reach = around.last().map_or(0.0, |last| last.squared_distance.sqrt());
+        let x = cloud.point(self.point);
+        let squared = |point: u32| squared_distance(x, cloud.point(point as usize));
+        let reach = around.last().map_or(0.0, |last| squared(*last).sqrt());
         if reach == 0.0 {
             return 0.0;
         }
         let mut cell = Cell::within(REACH_OF_CELL);
-        let (x, basis) = (cloud.point(self.point), tangent_basis(&self.normals[self.point * d..][..d]));
-        for found in around.iter().filter(|found| found.squared_distance > 0.0) {
-            if across(cloud, self.normals, self.point, found.point) > ON_SHEET {
+        let basis = tangent_basis(&self.normals[self.point * d..][..d]);
+        for &found in around.iter().filter(|found| squared(**found) > 0.0) {
+            if across(cloud, self.normals, self.point, found as usize) > ON_SHEET {
                 continue;
             }
-            let y = cloud.point(found.point);
+            let y = cloud.point(found as usize);
             let along =
                 |row: &[f64]| -> f64 { row.iter().zip(x).zip(y).map(|((t, x), y)| t * (y - x)).sum() };
             let [u, v] = [along(&basis[..d]), along(&basis[d..])];
             let length = u.hypot(v);
             // A neighbour straight above, of a point without a normal, has no direction in the plane.
             if length > 0.0 {
-                let stretch = found.squared_distance.sqrt() / length / reach;
+                let stretch = squared(found).sqrt() / length / reach;
                 cell.cut([u * stretch, v * stretch]);
             }
         }
@@ -89,18 +91,18 @@ impl Place<'_> {
     /// Computes `V_{d−1} R^{d−1} 2/(d+1) / Σ (1 − |y − x|²/R²)`: the integral of the summand over its sum.
     fn area(&self, radius: f64) -> f64 {
         let (cloud, k) = (self.sampled.cloud, self.sampled.cloud.dimension() - 1);
+        let x = cloud.point(self.point);
         let around = self.sampled.around.around(self.point).iter().take(n_neighbours(cloud) + 1);
-        let squared_reach =
-            REACH * REACH * around.clone().next_back().map_or(0.0, |last| last.squared_distance);
+        let around = around.map(|&point| squared_distance(x, cloud.point(point as usize)));
+        let squared_reach = REACH * REACH * around.clone().next_back().unwrap_or(0.0);
         if squared_reach == 0.0 {
             return 0.0;
         }
         // An edge across a gap may be longer than the reach.
         let term = |squared: f64| (1.0 - squared / squared_reach).max(0.0);
-        let x = cloud.point(self.point);
-        let on_sheet: f64 = self.own.iter().map(|edge| term(squared_distance(x, cloud.point(edge.b)))).sum();
-        let others = around.filter(|found| found.squared_distance > 0.0);
-        let all: f64 = others.map(|found| term(found.squared_distance)).sum();
+        let on_sheet: f64 =
+            self.own.iter().map(|edge| term(squared_distance(x, cloud.point(edge.b())))).sum();
+        let all: f64 = around.filter(|squared| *squared > 0.0).map(term).sum();
         let sum = OWN + on_sheet.max(LEAST_SHARE * all);
         ball_volume(k) * 2.0 / (k + 2) as f64 * (squared_reach.sqrt() / radius).powi(k as i32) / sum
     }
@@ -110,7 +112,7 @@ impl Place<'_> {
     fn length(&self) -> f64 {
         let x = self.sampled.cloud.point(self.point);
         let step = |edge: &Edge| -> [f64; 2] {
-            let y = self.sampled.cloud.point(edge.b);
+            let y = self.sampled.cloud.point(edge.b());
             [y[0] - x[0], y[1] - x[1]]
         };
         let Some(ahead) = self.own.first().map(step) else {
