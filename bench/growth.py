@@ -138,8 +138,9 @@ def sphere(n):
 
 
 def slope(rows, key):
-    """Fits log value against log n by least squares over the larger half of the sizes; returns the slope."""
-    upper = rows[len(rows) // 2 :]
+    """Fits log value against log n by least squares over the larger half of the sizes that were measured; returns the slope."""
+    known = [row for row in rows if key in row]
+    upper = known[len(known) // 2 :]
     x = [math.log(row["n"]) for row in upper]
     y = [math.log(row[key]) for row in upper]
     mean_x, mean_y = sum(x) / len(x), sum(y) / len(y)
@@ -164,7 +165,9 @@ def table(rows, slopes):
         cells = " | ".join(f"{share:.2f}" for share in added)
         lines.append(f"| the same, growth over growth from the size before | | {cells} | | 1 |")
     half = f"{rows[len(rows) // 2]['n']:,}"
-    lines.append(f"\nSlopes of log against log from n = {half}, best of the rounds. Memory is above that of the idle process; what is")
+    lines.append(
+        f"\nSlopes of log against log from n = {half}, best of the rounds. Memory is above that of the idle process; what is"
+    )
     lines.append("paid once, whatever n, keeps its slope below 2 and drops out of growth over growth.")
     return "\n".join(lines) + "\n"
 
@@ -201,7 +204,7 @@ class Panel:
         yield f'<rect x="{self.left}" y="{self.TOP}" width="{self.WIDTH}" height="{self.HEIGHT}" fill="none" stroke="#888"/>'
 
     def curve(self, index, rows, key, name, colour, slope, expected):
-        points = [self.place(row["n"], row[key]) for row in rows]
+        points = [self.place(row["n"], row[key]) for row in rows if key in row]
         line = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
         yield f'<polyline points="{line}" fill="none" stroke="{colour}" stroke-width="2"/>'
         yield from (f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2.5" fill="{colour}"/>' for x, y in points)
@@ -232,7 +235,7 @@ def picture(rows, slopes, times, memory):
 
 
 def bounds(rows, series):
-    values = [row[key] for row in rows for key, *_ in series]
+    values = [row[key] for row in rows for key, *_ in series if key in row]
     return min(values) / 1.5, max(values) * 1.5
 
 
@@ -241,7 +244,9 @@ def duration_label(power):
 
 
 def size_label(power):
-    return f"{10 ** (power - 9):g} GB" if power >= 9 else f"{10 ** (power - 6):g} MB" if power >= 6 else f"{10 ** (power - 3):g} kB"
+    return (
+        f"{10 ** (power - 9):g} GB" if power >= 9 else f"{10 ** (power - 6):g} MB" if power >= 6 else f"{10 ** (power - 3):g} kB"
+    )
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterable
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,10 @@ ROOT = Path(__file__).resolve().parents[3]
 BINARY = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release" / "gramian"
 
 
+#: What is measured against the number of points, by the name of its drawing.
+GROWN = {"scale": growth.LOCAL, "solvers": growth.SOLVERS}
+
+
 def main() -> None:
     arguments = parse()
     if not arguments.binary.exists():
@@ -44,18 +48,17 @@ def main() -> None:
         **Landmarks(setting, service, peers).works(),
         **Iterative(setting, service, peers, dragon).works(),
     }
-    chosen = choose([*works, "growth"], arguments.row)
+    chosen = choose([*works, *GROWN], arguments.row)
     busy = [machine.busy_cores()]
     rows = {name: measure(name, works[name](), arguments) for name in works if name in chosen}
-    grown, refusal = grow(setting, service) if "growth" in chosen else ([], "not measured")
+    grown = {name: grow(setting, service, name) for name in GROWN if name in chosen}
     busy.append(machine.busy_cores())
     facts = describe_run(setting, service, dragon, busy)
     write_json(facts, rows, grown)
     if not arguments.row and not arguments.quick:
-        write_pages(facts, rows, grown, refusal, arguments.cached_peers)
+        write_pages(facts, rows, grown, arguments.cached_peers)
     unserved = [name for name, row in rows.items() if row.ours.missing]
-    if "growth" in chosen and not grown:
-        unserved.append("growth")
+    unserved += [name for name, found in grown.items() if found.refusal]
     if unserved:
         sys.exit(f"not served: {', '.join(unserved)}")
     if arguments.strict and (short := [name for name, row in rows.items() if row.short]):
@@ -80,7 +83,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--no-peers", action="store_true", help="gramian alone")
     parser.add_argument("--cached-peers", action="store_true", help="peers are not run again on what they were run on before")
     parser.add_argument("--strict", action="store_true", help="fails if a bound of a row does not hold")
-    parser.add_argument("row", nargs="*", help="of the table, or growth, or patterns such as 'mesh-*'; all if absent")
+    parser.add_argument("row", nargs="*", help="of the table, or scale, or solvers, or patterns such as 'mesh-*'; all if absent")
     return parser.parse_args()
 
 
@@ -105,14 +108,22 @@ def peers_of(work: Work) -> Iterable[Entry]:
         yield Entry(Path(error.cmd[0]).name, missing=f"{' '.join(error.cmd[1:])} ended with {error.returncode}")
 
 
-def grow(setting: Setting, service: Service) -> tuple[list[growth.Row], str]:
-    """Measures growth; returns its rows, or the reason why there are none."""
-    print("-- growth", flush=True)
+@dataclass(frozen=True)
+class Grown:
+    """Costs against the number of points, or the reason why there are none."""
+
+    rows: list[growth.Row]
+    refusal: str = ""
+
+
+def grow(setting: Setting, service: Service, name: str) -> Grown:
+    print(f"-- {name}", flush=True)
+    sizes = growth.QUICK_SIZES if setting.is_quick else growth.SIZES
     try:
-        return growth.measure(service, growth.QUICK_SIZES if setting.is_quick else growth.SIZES), ""
+        return Grown(growth.measure(service, GROWN[name], sizes))
     except NotServed as error:
         print(f"   not served ({error})", flush=True)
-        return [], f"not served ({error})"
+        return Grown([], f"not served ({error})")
 
 
 def describe_run(setting: Setting, service: Service, dragon: Dragon, busy: list[float]) -> list[tuple[str, str]]:
@@ -129,7 +140,7 @@ def describe_run(setting: Setting, service: Service, dragon: Dragon, busy: list[
     return facts
 
 
-def write_json(facts: list[tuple[str, str]], rows: dict[str, Measured], grown: list[growth.Row]) -> None:
+def write_json(facts: list[tuple[str, str]], rows: dict[str, Measured], grown: dict[str, Grown]) -> None:
     def entry(found: Entry) -> dict[str, Any]:
         figures = {name: asdict(figure) for name, figure in found.figures.items()}
         return {"who": found.who, "figures": figures, "remark": found.remark, "missing": found.missing}
@@ -143,32 +154,39 @@ def write_json(facts: list[tuple[str, str]], rows: dict[str, Measured], grown: l
         }
         for name, row in rows.items()
     }
-    document = {"machine": dict(facts), "command": sys.argv[1:], "rows": table, "growth": grown}
+    document = {
+        "machine": dict(facts),
+        "command": sys.argv[1:],
+        "rows": table,
+        **{name: found.rows for name, found in grown.items()},
+    }
     (ROOT / "bench" / "scale.json").write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n")
 
 
-def write_pages(
-    facts: list[tuple[str, str]], rows: dict[str, Measured], grown: list[growth.Row], refusal: str, has_cached_peers: bool
-) -> None:
-    """Writes bench/SCALE.md, docs/scale.svg and the figures in docs/scale.md."""
+def write_pages(facts: list[tuple[str, str]], rows: dict[str, Measured], grown: dict[str, Grown], has_cached_peers: bool) -> None:
+    """Writes bench/SCALE.md, and the drawings and figures of docs/scale.md."""
     holds = sum(row.verdict == "holds" for row in rows.values())
     unserved = sum(bool(row.ours.missing) for row in rows.values())
     summary = f"Of {len(rows)} rows {holds} hold, {len(rows) - holds - unserved} fall short, {unserved} are not served."
     if has_cached_peers:
         summary += " Figures of the peers are of an earlier run on this machine."
-    if grown:
-        growth.draw(grown, ROOT / "docs" / "scale.svg")
-        figures = f"![growth](../docs/scale.svg)\n\n{growth.table(grown)}"
-        fill(ROOT / "docs" / "scale.md", "growth", growth.table(grown))
-        fill(ROOT / "docs" / "scale.md", "paper", growth.on_paper(grown[-1]))
-    else:
-        figures = refusal
+    page, sections = ROOT / "docs" / "scale.md", []
+    for name, found in grown.items():
+        if found.rows:
+            growth.draw(found.rows, GROWN[name], ROOT / "docs" / f"{name}.svg")
+            table = growth.table(found.rows, GROWN[name])
+            fill(page, name, table)
+            sections.append(f"## {name.capitalize()}\n\n![{name}](../docs/{name}.svg)\n\n{table}")
+        else:
+            sections.append(f"## {name.capitalize()}\n\n{found.refusal}")
+    if grown["scale"].rows:
+        fill(page, "paper", growth.on_paper(grown["scale"].rows[-1]))
     parts = [
         "# Scale",
         f"Written by `bench/scale`; [docs/scale.md](../docs/scale.md) says what the rows mean. {summary}",
         "\n".join(["| | |", "|---|---|", *(f"| {name} | {value} |" for name, value in facts)]),
         markdown(rows.values()),
-        f"## Growth\n\n{figures}",
+        *sections,
     ]
     (ROOT / "bench" / "SCALE.md").write_text("\n\n".join(parts) + "\n")
 
