@@ -164,25 +164,25 @@ async fn the_answer_says_how_many_landmarks_there_are_and_what_they_leave() {
 }
 
 #[tokio::test]
-async fn beyond_what_is_factorized_auto_takes_landmarks_where_few_are_enough() {
+async fn beyond_what_is_factorized_auto_takes_landmarks_where_few_are_enough_and_keeps_tolerances() {
     let server = Server::with_flags(&["--max-dense-points", "1000"]).await;
     let points = fibonacci_sphere(3000);
     let values: Vec<f64> = points.iter().map(|x| (2.0 * x[0]).sin()).collect();
-    let chosen = |kernel: Value| {
+    let narrow = json!({"family": "gauss", "length_scale": 0.05});
+    for (kernel, tolerance, expected, word) in [
+        (smooth(), None, "landmark", "few landmarks"),
+        (smooth(), Some(1e-7), "landmark", "few landmarks"),
+        (rough(), None, "local", "more points"),
+        (rough(), Some(1e-7), "iterative", "tolerance"),
+        (narrow, None, "local", "more points"),
+        (json!({"family": "gauss"}), None, "local", "more points"),
+    ] {
         let body = json!({"cloud": {"points": points}, "values": values, "queries": [[0.0, 0.0, 1.0]],
-            "alpha": 1e-4, "kernel": kernel, "include": ["variance"]});
-        let server = &server;
-        async move {
-            let answer = server.post("/v1/posterior", &body).await.expect_ok();
-            ["solver", "solver_reason"]
-                .map(|member| answer["diagnostics"][member].as_str().unwrap().to_owned())
-        }
-    };
-    let [solver, reason] = chosen(smooth()).await;
-    assert!(solver == "landmark" && reason.contains("few landmarks"), "{solver}: {reason}");
-    for kernel in [rough(), json!({"family": "gauss", "length_scale": 0.05}), json!({"family": "gauss"})] {
-        let [solver, reason] = chosen(kernel.clone()).await;
-        assert!(solver == "local" && reason.contains("more points"), "{kernel}: {solver}: {reason}");
+            "alpha": 1e-4, "kernel": kernel, "tolerance": tolerance, "include": ["variance"]});
+        let answer = server.post("/v1/posterior", &body).await.expect_ok();
+        let [solver, reason] =
+            ["solver", "solver_reason"].map(|member| answer["diagnostics"][member].as_str().unwrap());
+        assert!(solver == expected && reason.contains(word), "{kernel}: {solver}: {reason}");
     }
 }
 

@@ -21,7 +21,7 @@ from .peers import Done
 SAFETENSORS = "application/x-safetensors"
 #: Deadline of the server in seconds. It exceeds the default, so that a slow answer is measured and not cut
 #: off.
-DEADLINE_SECONDS = 600
+DEADLINE_SECONDS = 1_800
 
 
 class NotServed(Exception):

@@ -30,6 +30,9 @@ pub enum AutoReason {
     /// The cloud has more points than the dense solver accepts, and few landmarks span the kernels of all of
     /// them.
     FewLandmarks,
+    /// The cloud has more points than the dense solver accepts, and the request names a tolerance, which only
+    /// a function of all values can keep.
+    Tolerance,
 }
 
 /// Flops of landmarks up to which `auto` takes them for values: about twenty seconds.

@@ -48,8 +48,15 @@ const GROUPS: [usize; 7] = [1, 3, 8, 24, 72, 216, 648];
 /// Least number of means that a group size must leave of a cloud to be tried.
 const LEAST_MEANS: usize = 60;
 
-/// Fraction to which deviations must fall for the next larger group size to be accepted.
+/// Fraction to which deviations must fall for the next larger group size to be accepted, in the median over
+/// the sites. Each site is compared with itself: deviations of a scan differ between sites by far more.
 const WORTH: f64 = 0.95;
+
+/// The same for means of three instead of points. Where there is hardly anything but noise, deviations fall
+/// to a fifth, and in a lens that is thinner than its points are apart to two thirds. A scan thinned to a
+/// twentieth, whose shape its points just resolve, lost half of the accuracy of its curvatures to means that
+/// promised deviations of three quarters.
+const WORTH_OF_MEANS: f64 = 0.7;
 
 /// A ratio of the variance of the noise to that of the heights, and how common it is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -123,17 +130,22 @@ impl Patches {
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
         check_dimension(cloud.dimension())?;
-        let mut best: Option<(f64, Self)> = None;
+        let mut best: Option<(Vec<f64>, Self)> = None;
         for group in GROUPS {
             if group > 1 && cloud.n_points() / group < LEAST_MEANS {
                 break;
             }
             let support = Support::of(group, cloud.clone(), sampling.clone(), observer)?;
-            let (deviation, patches) = Self::over(sites, support, observer)?;
+            let (deviations, patches) = Self::over(sites, support, observer)?;
             let is_exact = patches.noise == 0.0;
-            let is_better = best.as_ref().is_none_or(|(least, _)| deviation < WORTH * least);
+            let worth = if best.as_ref().is_some_and(|(_, best)| best.points_per_mean() == 1) {
+                WORTH_OF_MEANS
+            } else {
+                WORTH
+            };
+            let is_better = best.as_ref().is_none_or(|(least, _)| ratio(&deviations, least) < worth);
             if is_better {
-                best = Some((deviation, patches));
+                best = Some((deviations, patches));
             }
             if !is_better || is_exact {
                 break;
@@ -180,9 +192,14 @@ impl Patches {
         }
     }
 
-    /// Learns the hyperparameters on one support. Also returns the median over the sites of the largest
-    /// deviation of a principal curvature, which [`Patches::learned_at`] compares between group sizes.
-    fn over(sites: &Cloud, support: Support, observer: &dyn Observer) -> Result<(f64, Self), NumericsError> {
+    /// Learns the hyperparameters on one support. Also returns the largest deviation of a principal curvature
+    /// at each site, infinite where there is none, which [`Patches::learned_at`] compares between group
+    /// sizes.
+    fn over(
+        sites: &Cloud,
+        support: Support,
+        observer: &dyn Observer,
+    ) -> Result<(Vec<f64>, Self), NumericsError> {
         let d = sites.dimension();
         let count = n_neighbours(d, support.cloud().n_points());
         let mut patches = Self {
@@ -194,15 +211,17 @@ impl Patches {
             kernel: PatchKernel::default(),
         };
         if count < n_terms(d) + 2 {
-            return Ok((f64::INFINITY, patches));
+            return Ok((vec![f64::INFINITY; sites.n_points()], patches));
         }
         patches.models = patches.pooled(LENGTH_SCALE, sites, observer)?;
         let chosen: Vec<Model> = patches.models.iter().map(|weighted| weighted.model).collect();
         let whole = patches.krige_each(sites, &chosen, Purpose::Prediction, observer)?;
-        let estimates: Vec<(f64, f64, f64, f64)> =
-            whole.iter().flatten().filter_map(|(at, kriged)| patches.summary(at, kriged, d)).collect();
-        let middle = |of: fn(&(f64, f64, f64, f64)) -> f64| median(estimates.iter().map(of).collect());
-        let deviation = middle(|e| e.0).unwrap_or(f64::INFINITY);
+        let summary =
+            |found: &Option<Found>| found.as_ref().and_then(|(at, kriged)| patches.summary(at, kriged, d));
+        let estimates: Vec<Option<(f64, f64, f64, f64)>> = whole.iter().map(summary).collect();
+        let middle =
+            |of: fn(&(f64, f64, f64, f64)) -> f64| median(estimates.iter().flatten().map(of).collect());
+        let deviations = estimates.iter().map(|e| e.map_or(f64::INFINITY, |e| e.0)).collect();
         patches.noise = middle(|e| e.1).unwrap_or(0.0).sqrt();
         patches.kernel = PatchKernel {
             length_scale: middle(|e| e.2).unwrap_or(1.0),
@@ -211,7 +230,7 @@ impl Patches {
         if patches.noise > 0.0 {
             patches.stiff = patches.pooled(STIFF, sites, observer)?;
         }
-        Ok((deviation, patches))
+        Ok((deviations, patches))
     }
 
     /// Returns the mixture of models of one length scale that makes the neighbourhoods of these queries most
@@ -271,6 +290,12 @@ impl Patches {
     pub fn n_bytes(&self) -> usize {
         self.support.n_bytes() + vec_bytes(&self.models) + vec_bytes(&self.stiff)
     }
+}
+
+/// Median ratio of deviations at the same sites, infinite where none is finite.
+fn ratio(deviations: &[f64], others: &[f64]) -> f64 {
+    let ratios = deviations.iter().zip(others).map(|(a, b)| a / b);
+    median(ratios.filter(|ratio| !ratio.is_nan()).collect()).unwrap_or(f64::INFINITY)
 }
 
 /// Returns the most points, or means, that a regression sees.

@@ -194,6 +194,31 @@ fn the_fallback_stops_at_every_checkpoint() {
 }
 
 #[test]
+fn landmarks_and_iterations_stop_at_every_checkpoint() {
+    let cloud = Arc::new(fibonacci_sphere(600));
+    let values: Vec<f64> = cloud.points().map(|x| (2.0 * x[0]).sin()).collect();
+    for family in [Family::Gauss, Family::Laplace { epsilon: 0.0 }] {
+        let outcome = |checkpoint: usize| {
+            let observer = StopAt { checkpoint, n_checkpoints: Default::default() };
+            let kernel = Kernel::new(family, 1.0, 1.0).unwrap();
+            let system = System::new(cloud.clone(), kernel, Regularization::Uniform(1e-3)).unwrap();
+            let solver = match family {
+                Family::Gauss => Solver::landmark(system, &observer),
+                _ => Solver::iterative_to(1e-9, system, &observer),
+            };
+            let found = solver.and_then(|solver| Solution::of(&solver, &values, &observer));
+            (found.map(|solution| solution.relative_residual <= 1e-9), observer.n_checkpoints.into_inner())
+        };
+        let (found, n_checkpoints) = outcome(usize::MAX);
+        assert_eq!(found, Ok(true));
+        assert!(n_checkpoints > 10, "{family:?}: {n_checkpoints}");
+        for checkpoint in (0..n_checkpoints).step_by(n_checkpoints.div_ceil(30)) {
+            assert_eq!(outcome(checkpoint).0, Err(NumericsError::Cancelled), "{family:?}, {checkpoint}");
+        }
+    }
+}
+
+#[test]
 fn rows_above_the_tolerance_are_reproduced_by_the_pivots() {
     // L₁₁L₁₁ᵀ is (K + D)(Z, Z). So solving for one of its columns gives a unit vector, noise variances
     // included.

@@ -18,7 +18,7 @@ pub enum SolverChoice {
     /// smooth kernels and up to millions of points.
     Landmark,
     /// Conjugate gradients on the full system, until the residual is within the tolerance: for rough kernels
-    /// and up to a hundred thousand points.
+    /// and up to a million points.
     Iterative,
     /// Uses only the points nearest to each query: kriging for values, regressions for surfaces. For
     /// thousands to millions of points.

@@ -96,6 +96,8 @@ macro_rules! request {
             /// The method that solves the linear system.
             pub solver: Option<$crate::http::fields::SolverChoice>,
             /// The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+            /// Beyond the dense limit, `auto` takes that solver for values if this field is given and few
+            /// landmarks are not enough.
             #[schema(minimum = 1e-14, maximum = 1e-5)]
             pub tolerance: Option<f64>,
             /// The treatment of points that coincide when alpha is 0.

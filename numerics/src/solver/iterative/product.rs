@@ -18,12 +18,12 @@ const ROWS: usize = 128;
 /// Seed of the rows.
 const SEED: u64 = 36;
 
-/// Size of weights, over that of their product, at which the error of the product is the power 5/4 of the part
-/// to which kernels are interpolated. It was 300 for Matérn kernels and Laplace on 100,000 points: errors of
-/// single kernels mostly cancel.
+/// With kernels interpolated to a part p of k₀, the error of a product Ax was about `p^(5/4) k₀|x|/300` for
+/// Matérn kernels and Laplace on 100,000 points: errors of single kernels mostly cancel. This is a sixth of
+/// that number, so that the first try suffices.
 const CANCELLED: f64 = 50.0;
 
-/// The inverse of that power.
+/// The inverse of 5/4.
 const POWER: f64 = 0.8;
 
 /// Time of a pair of a fast product, over that of a plain one.

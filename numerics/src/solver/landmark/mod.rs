@@ -239,9 +239,12 @@ impl Landmarks {
     }
 
     /// Whether the true system is solved too, with the landmarks as preconditioner, so that the function is
-    /// that of the dense solver to its last digits. Without noise to speak of, the landmarks alone are that.
+    /// that of the dense solver to its last digits. Without noise to speak of, the landmarks alone are that,
+    /// but not where some values have noise and others none: weights of the latter are rounding errors of the
+    /// function over next to nothing.
     pub(super) fn preconditions(&self) -> bool {
-        self.rows.coordinates() == Coordinates::Whitened && self.system.n_points() <= MOST_PRECONDITIONED
+        let has_noise = self.rows.coordinates() == Coordinates::Whitened || !self.weighing.is_uniform;
+        has_noise && self.system.n_points() <= MOST_PRECONDITIONED
     }
 
     /// The weights b of unknowns `[r]`.

@@ -24,10 +24,22 @@ struct Off {
 
 /// Compares both solvers at places beside the points.
 fn off(cloud: &Cloud, noise: &Regularization) -> Off {
-    let values: Vec<f64> = cloud.points().map(|x| (2.0 * x[0]).sin() + x[1] * x[2]).collect();
-    let places: Vec<f64> = fibonacci_sphere(40).coordinates().iter().map(|x| 0.97 * x).collect();
-    let places = Cloud::new(places, 3).unwrap();
-    let system = || system(cloud, Family::Gauss, noise.clone());
+    off_in(1.0, 0.0, cloud, noise)
+}
+
+fn field(cloud: &Cloud) -> Vec<f64> {
+    cloud.points().map(|x| (2.0 * x[0]).sin() + x[1] * x[2]).collect()
+}
+
+/// Compares both solvers in another unit, and moved from the origin.
+fn off_in(unit: f64, offset: f64, cloud: &Cloud, noise: &Regularization) -> Off {
+    let values = field(cloud);
+    let moved = |factor: f64, of: &Cloud| {
+        Cloud::new(of.coordinates().iter().map(|x| unit * (factor * x + offset)).collect(), 3).unwrap()
+    };
+    let places = moved(0.97, &fibonacci_sphere(40));
+    let kernel = Kernel::new(Family::Gauss, 0.8 * unit, 1.7).unwrap();
+    let system = || System::new(Arc::new(moved(1.0, cloud)), kernel.clone(), noise.clone()).unwrap();
     let answers =
         [Solver::dense(system(), &Unobserved), Solver::landmark(system(), &Unobserved)].map(|solver| {
             let solver = Arc::new(solver.unwrap());
@@ -108,4 +120,53 @@ fn rough_kernels_are_refused() {
     let system = system(&cloud, Family::Laplace { epsilon: 0.0 }, Regularization::Uniform(1e-6));
     let refused = Solver::landmark(system, &Unobserved).map(|solver| solver.rank());
     assert_eq!(refused, Err(NumericsError::RankTooLarge { most: 1000 }));
+}
+
+#[test]
+fn units_and_offsets_change_nothing() {
+    let cloud = fibonacci_sphere(1200);
+    for (unit, offset) in [(1e-9, 0.0), (1e8, 0.0), (1.0, 1e5), (1e-3, -700.0)] {
+        let noise = Regularization::Uniform(1e-4);
+        let Off { means, variances, residual } = off_in(unit, offset, &cloud, &noise);
+        // Coordinates of 1e5 have lost five digits of the sphere, to both solvers alike.
+        assert!(
+            means < 1e-7 && variances < 1e-5 && residual < 1e-7,
+            "{unit} {offset}: {means} {variances} {residual}"
+        );
+    }
+}
+
+#[test]
+fn clusters_far_points_copies_and_exact_values_do_not_matter() {
+    let sphere = fibonacci_sphere(1200);
+    let mut points = sphere.coordinates().to_vec();
+    points.extend(fibonacci_sphere(100).points().flat_map(|x| [1.0 + 0.01 * x[0], 0.01 * x[1], 0.01 * x[2]]));
+    points.extend((0..10).flat_map(|i| [20.0 + f64::from(i), 0.0, 3.0 * f64::from(i)]));
+    points.extend_from_slice(&sphere.coordinates()[..30]);
+    let cloud = Cloud::new(points, 3).unwrap();
+    check("noise", &cloud, &Regularization::Uniform(1e-4));
+    // One of each two copies has noise.
+    let exact = |i: usize| i % 50 == 40 && i < 1200;
+    let noise = (0..cloud.n_points()).map(|i| if exact(i) { 0.0 } else { 1e-4 }).collect();
+    check("exact", &cloud, &Regularization::PerPoint(noise));
+}
+
+#[test]
+fn whichever_points_are_looked_at_first_the_function_is_the_same() {
+    let cloud = fibonacci_sphere(10_500);
+    let (values, places) = (field(&cloud), fibonacci_sphere(40));
+    let means = |seed: usize| {
+        // Landmarks are chosen among 10,000 of the points.
+        let order: Vec<usize> =
+            (0..10_500).map(|i| (i * [1, 11, 13, 17, 19][seed] + 101 * seed) % 10_500).collect();
+        let system = system(&cloud.select(&order), Family::Gauss, Regularization::Uniform(1e-4));
+        let solver = Arc::new(Solver::landmark(system, &Unobserved).unwrap());
+        let values: Vec<f64> = order.iter().map(|&point| values[point]).collect();
+        let fitted = Interpolant::fit(solver, &values, &Unobserved).unwrap();
+        fitted.at(&places, JetOrder::Value, &Unobserved).unwrap().values()
+    };
+    let first = means(0);
+    for seed in 1..5 {
+        assert!(means(seed).iter().zip(&first).all(|(a, b)| (a - b).abs() < 1e-8), "{seed}");
+    }
 }

@@ -14,7 +14,7 @@ use crate::points::cloud::{Cloud, squared_distance};
 /// Points of the smallest clusters are fewer than twice this.
 const LEAST: usize = 64;
 
-/// A tree of clusters. The one with all points has the index 1, and the halves of cluster i are 2i and 2i + 1.
+/// A tree of clusters. The one with all points has the index 1, and cluster i has the halves 2i and 2i + 1.
 /// All clusters of a level have equally many points, up to one.
 pub(super) struct Clusters {
     /// Indices of the points, such that those of a cluster are a range.

@@ -34,9 +34,9 @@ pub(super) struct Grid<'a> {
 impl<'a> Grid<'a> {
     /// Creates the grid that interpolates kernels to about this part of their size, in boxes that lie apart.
     ///
-    /// Polynomials of degree p converge like `ρ⁻ᵖ`, where the kernel is analytic in an ellipse around the side
-    /// of the box whose half-axes add up to ρ (Trefethen 2013, th. 8.2). Their foci are the ends of the side,
-    /// and they reach the nearest point of another cluster. Short sides take few nodes.
+    /// Polynomials of degree p converge like `ρ⁻ᵖ`, where the kernel is analytic in an ellipse around the
+    /// side of the box whose half-axes add up to ρ (Trefethen 2013, th. 8.2). Their foci are the ends of the
+    /// side, and they reach the nearest point of another cluster. Short sides take few nodes.
     pub(super) fn of(cluster: &'a Cluster, accuracy: f64) -> Self {
         let distance = cluster.radius * (2.0 / SEPARATION - 1.0);
         let mut counts = [1; MAX_DIMENSION];

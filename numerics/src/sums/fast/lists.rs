@@ -9,8 +9,8 @@ use crate::points::cloud::squared_distance;
 /// On a torus of 1,000,000 points, 0.6 and 0.85 took a tenth longer for equal errors.
 pub(super) const SEPARATION: f64 = 0.7;
 
-/// For each cluster, by its index, those that it is paired with. Every two points are in one pair of clusters,
-/// in either order.
+/// For each cluster, by its index, those that it is paired with. Every two points are in one pair of
+/// clusters, in either order.
 pub(super) struct Lists {
     /// Clusters that lie apart, whose kernels are interpolated.
     pub far: Vec<Vec<u32>>,

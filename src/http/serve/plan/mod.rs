@@ -106,6 +106,9 @@ pub fn words(reason: AutoReason) -> &'static str {
         AutoReason::FewLandmarks => {
             "the cloud has more points than a dense factorization may have, and few landmarks span their kernels"
         }
+        AutoReason::Tolerance => {
+            "the cloud has more points than a dense factorization may have, and the request names a tolerance"
+        }
         AutoReason::FineCurve => "the level set of a finely sampled curve comes from local regressions",
     }
 }

@@ -231,6 +231,8 @@ impl<'a> Planner<'a> {
             SolverChoice::Auto if on.n_points() > self.app.config.max_dense_points => {
                 let (kind, reason) = if has_few_landmarks(fit, on)? {
                     (SolverKind::Landmark, AutoReason::FewLandmarks)
+                } else if fit.tolerance.is_some() {
+                    (SolverKind::Iterative, AutoReason::Tolerance)
                 } else {
                     (SolverKind::Local, AutoReason::BeyondDense)
                 };
