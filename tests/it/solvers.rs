@@ -177,8 +177,11 @@ async fn beyond_what_is_factorized_auto_takes_landmarks_where_few_are_enough_and
         (narrow, None, "local", "more points"),
         (json!({"family": "gauss"}), None, "local", "more points"),
     ] {
-        let body = json!({"cloud": {"points": points}, "values": values, "queries": [[0.0, 0.0, 1.0]],
-            "alpha": 1e-4, "kernel": kernel, "tolerance": tolerance, "include": ["variance"]});
+        let mut body = json!({"cloud": {"points": points}, "values": values, "queries": [[0.0, 0.0, 1.0]],
+            "alpha": 1e-4, "kernel": kernel, "include": ["variance"]});
+        if let Some(tolerance) = tolerance {
+            body["tolerance"] = json!(tolerance);
+        }
         let answer = server.post("/v1/posterior", &body).await.expect_ok();
         let [solver, reason] =
             ["solver", "solver_reason"].map(|member| answer["diagnostics"][member].as_str().unwrap());

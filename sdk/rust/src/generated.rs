@@ -310,7 +310,9 @@ mean. The diagnostics repeat all of it.*/
         ///The function whose level set is the surface. Default: `auto`.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub surface: ::std::option::Option<SurfaceChoice>,
-        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        /**The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+Beyond the dense limit, `auto` takes that solver for values if this field is given and few
+landmarks are not enough.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub tolerance: ::std::option::Option<f64>,
     }
@@ -931,7 +933,9 @@ mean. The diagnostics repeat all of it.*/
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
-        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        /**The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+Beyond the dense limit, `auto` takes that solver for values if this field is given and few
+landmarks are not enough.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub tolerance: ::std::option::Option<f64>,
         /**Lists of values. Each has a value per point, in the order of the points.
@@ -1033,7 +1037,9 @@ mean. The diagnostics repeat all of it.*/
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
-        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        /**The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+Beyond the dense limit, `auto` takes that solver for values if this field is given and few
+landmarks are not enough.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub tolerance: ::std::option::Option<f64>,
         ///The values at the points, in their order.
@@ -1488,7 +1494,9 @@ cloud.*/
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
-        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        /**The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+Beyond the dense limit, `auto` takes that solver for values if this field is given and few
+landmarks are not enough.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub tolerance: ::std::option::Option<f64>,
     }
@@ -1559,7 +1567,9 @@ mean. The diagnostics repeat all of it.*/
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
-        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        /**The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+Beyond the dense limit, `auto` takes that solver for values if this field is given and few
+landmarks are not enough.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub tolerance: ::std::option::Option<f64>,
         ///The values at the points of `cloud`, in their order.
@@ -1630,7 +1640,9 @@ mean. The diagnostics repeat all of it.*/
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
-        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        /**The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+Beyond the dense limit, `auto` takes that solver for values if this field is given and few
+landmarks are not enough.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub tolerance: ::std::option::Option<f64>,
     }
@@ -1739,7 +1751,9 @@ points.*/
         ///The function whose level set is the surface. Default: `auto`.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub surface: ::std::option::Option<SurfaceChoice>,
-        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        /**The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+Beyond the dense limit, `auto` takes that solver for values if this field is given and few
+landmarks are not enough.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub tolerance: ::std::option::Option<f64>,
         /**A number for each point of the cloud. If given, a level of the function through them is meshed.
@@ -2130,7 +2144,9 @@ mean. The diagnostics repeat all of it.*/
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
-        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        /**The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+Beyond the dense limit, `auto` takes that solver for values if this field is given and few
+landmarks are not enough.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub tolerance: ::std::option::Option<f64>,
         ///The values at the points, in their order.
@@ -2253,7 +2269,9 @@ Default: 96 to 191 points that the solver chooses.*/
         ///The function whose level set is the surface. Default: `auto`.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub surface: ::std::option::Option<SurfaceChoice>,
-        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        /**The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+Beyond the dense limit, `auto` takes that solver for values if this field is given and few
+landmarks are not enough.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub tolerance: ::std::option::Option<f64>,
     }
@@ -2534,7 +2552,9 @@ An empty list counts as absent.*/
         ///The threshold of `exceedance_probabilities` for a new observation, unit of the values.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub threshold: ::std::option::Option<f64>,
-        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        /**The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+Beyond the dense limit, `auto` takes that solver for values if this field is given and few
+landmarks are not enough.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub tolerance: ::std::option::Option<f64>,
         /**Lists of observed values. Each has a value per point, in the order of the points.
@@ -2715,7 +2735,9 @@ An empty list counts as absent.*/
         ///The threshold of `exceedance_probabilities` for a new observation, unit of the values.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub threshold: ::std::option::Option<f64>,
-        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        /**The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+Beyond the dense limit, `auto` takes that solver for values if this field is given and few
+landmarks are not enough.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub tolerance: ::std::option::Option<f64>,
         ///The observed values at the points, in their order.
@@ -2873,7 +2895,9 @@ mean. The diagnostics repeat all of it.*/
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
-        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        /**The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+Beyond the dense limit, `auto` takes that solver for values if this field is given and few
+landmarks are not enough.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub tolerance: ::std::option::Option<f64>,
     }
@@ -3388,7 +3412,9 @@ cloud.*/
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
-        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        /**The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+Beyond the dense limit, `auto` takes that solver for values if this field is given and few
+landmarks are not enough.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub tolerance: ::std::option::Option<f64>,
     }
@@ -3461,7 +3487,9 @@ mean. The diagnostics repeat all of it.*/
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
-        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        /**The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+Beyond the dense limit, `auto` takes that solver for values if this field is given and few
+landmarks are not enough.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub tolerance: ::std::option::Option<f64>,
         ///The values at the points of `cloud`, in their order.
@@ -3534,7 +3562,9 @@ mean. The diagnostics repeat all of it.*/
         ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
-        ///The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+        /**The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+Beyond the dense limit, `auto` takes that solver for values if this field is given and few
+landmarks are not enough.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub tolerance: ::std::option::Option<f64>,
     }

@@ -44,6 +44,8 @@ class PosteriorBatchRequest:
             list counts as absent.
         solver (SolverChoice | Unset): The method that solves the linear system.
         tolerance (float | Unset): The largest relative residual of an answer of the solver `iterative`. Default: 1e-8.
+            Beyond the dense limit, `auto` takes that solver for values if this field is given and few
+            landmarks are not enough.
         duplicates (DuplicatePolicy | Unset): The treatment of points that coincide when alpha is 0.
         mean (MeanChoice | Unset): The mean of a function: its part beside the kernel, which it tends to far from the
             points.
