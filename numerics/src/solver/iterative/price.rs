@@ -25,7 +25,7 @@ pub(crate) fn iterative_price(n_points: usize, dimension: usize) -> Price {
 pub(crate) fn iterative_fit_price(n_points: usize, dimension: usize) -> Price {
     let n = n_points as f64;
     let pairs = EXPECTED * n * pairs_per_point(n_points, dimension, 0.5) + 0.5 * n * n;
-    Price::of_numbers(n_points.saturating_mul(12), pairs * pair_flops(dimension, 0))
+    Price::of_numbers(n_points.saturating_mul(20), pairs * pair_flops(dimension, 0))
 }
 
 /// The price of covariances of functionals, `held` at once: each is a solve, and those of a block share their
@@ -35,7 +35,7 @@ pub(crate) fn iterative_covariances_price(held: usize, sizes: Sizes) -> Price {
     let (n, blocks) = (n_points as f64, n_queries.div_ceil(SOLVED_AT_ONCE) as f64);
     let of_pair = blocks * pair_flops(dimension, 0) + 2.0 * n_queries as f64;
     let flops = EXPECTED * n * pairs_per_point(n_points, dimension, 1.0) * of_pair;
-    let columns = 5 * n_queries.min(held) + 12 * n_queries.min(SOLVED_AT_ONCE);
+    let columns = 5 * n_queries.min(held) + 16 * n_queries.min(SOLVED_AT_ONCE);
     Price::of_numbers(n_points.saturating_mul(columns), flops)
 }
 
