@@ -195,7 +195,9 @@ fn update_with_hyperparameters(hasher: &mut blake3::Hasher, known: &SurfaceHyper
     hasher.update(&regression.points_per_mean.to_le_bytes());
     let PatchKernel { length_scale, variance } = regression.kernel;
     update_with_floats(hasher, &[regression.noise, length_scale, variance, *radius, *least_ratio]);
-    for mixture in [&regression.noise_ratios, &regression.flat_noise_ratios] {
+    let mixtures =
+        [&regression.noise_ratios, &regression.flat_noise_ratios, &regression.quartic_noise_ratios];
+    for mixture in mixtures {
         hasher.update(&[mixture.len() as u8]);
         mixture.iter().for_each(|of| update_with_floats(hasher, &[of.ratio, of.log_share]));
     }

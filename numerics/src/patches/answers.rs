@@ -7,7 +7,7 @@ use super::Patches;
 use super::estimate::Estimate;
 use super::neighbourhood::Neighbourhood;
 use super::pooled::Weighted;
-use super::regression::{Model, n_terms};
+use super::regression::{Kriged, n_terms};
 use super::room::{Purpose, Room};
 use crate::error::Result;
 use crate::machine::instruction_set::InstructionSet;
@@ -178,8 +178,6 @@ impl Patches {
         if self.count < n_terms(d) + 2 {
             return Ok(geometry);
         }
-        let of = |mixture: &[Weighted]| mixture.iter().map(|weighted| weighted.model).collect::<Vec<Model>>();
-        let (models, stiff) = (of(&self.models), of(&self.stiff));
         let lanes = InstructionSet::best().n_lanes();
         let slots = geometry.slots(d, lanes).into_par_iter().enumerate();
         slots.try_for_each_init(
@@ -188,7 +186,7 @@ impl Patches {
                 observer.checkpoint()?;
                 let first = batch * lanes;
                 let places = room.put(queries, first..(first + lanes).min(m));
-                let estimates = self.estimates(room, &places, [&models, &stiff], are_points);
+                let estimates = self.estimates(room, &places, are_points);
                 for (lane, (place, estimate)) in places.iter().zip(&estimates).enumerate() {
                     if let (Some(place), Some(estimate)) = (place, estimate) {
                         slots.put(lane, place, estimate, d, are_points);
@@ -200,33 +198,49 @@ impl Patches {
         Ok(geometry)
     }
 
-    /// Estimates the surface in each lane by `models`. Where it is flat, the slopes are taken from the
-    /// `stiff` models.
+    /// Estimates the surface in each lane: with a trend of fourth order where that was learned and there are
+    /// enough points for it, with a quadric elsewhere. Where a surface with noise is flat, the slopes are
+    /// those of the stiff models.
     fn estimates(
         &self,
         room: &mut Room<'_>,
         places: &[Option<Neighbourhood>],
-        [models, stiff]: [&[Model]; 2],
         are_points: bool,
-    ) -> SmallVec<[Option<Estimate>; MAX_LANES]> {
-        let d = self.support.cloud().dimension();
-        room.krige(models, Purpose::Prediction);
-        let mut estimates = SmallVec::new();
-        for (place, kriged) in places.iter().zip(&room.kriged) {
-            estimates.push(place.as_ref().and_then(|_| Estimate::of(&self.models, kriged, d)));
+    ) -> Estimates {
+        let mut estimates: Estimates = places.iter().map(|_| None).collect();
+        for mixture in [&self.quartic, &self.models] {
+            let is_missing = places.iter().zip(&estimates).any(|(p, e)| p.is_some() && e.is_none());
+            if is_missing && !mixture.is_empty() {
+                let found = mixed(room, places, mixture);
+                estimates.iter_mut().zip(found).for_each(|(own, found)| *own = own.take().or(found));
+            }
         }
+        let d = self.support.cloud().dimension();
         let is_flat = |estimate: &Estimate| estimate.normal_deviation(d, are_points) < FLAT;
-        if stiff.is_empty() || !estimates.iter().flatten().any(is_flat) {
+        if self.stiff.is_empty() || !estimates.iter().flatten().any(is_flat) {
             return estimates;
         }
-        room.krige(stiff, Purpose::Prediction);
-        for (estimate, kriged) in estimates.iter_mut().zip(&room.kriged) {
+        let stiff = mixed(room, places, &self.stiff);
+        for (estimate, stiff) in estimates.iter_mut().zip(stiff) {
             if let Some(estimate) = estimate.as_mut().filter(|estimate| is_flat(estimate)) {
-                estimate.take_slopes(Estimate::of(&self.stiff, kriged, d), d);
+                estimate.take_slopes(stiff, d);
             }
         }
         estimates
     }
+}
+
+/// Estimates by lane.
+type Estimates = SmallVec<[Option<Estimate>; MAX_LANES]>;
+
+/// Estimates in the lanes with a neighbourhood that is large enough for the models.
+fn mixed(room: &mut Room<'_>, places: &[Option<Neighbourhood>], mixture: &[Weighted]) -> Estimates {
+    room.krige(mixture.iter().map(|weighted| &weighted.model), Purpose::Prediction);
+    let d = room.dimension();
+    let of = |(place, kriged): (&Option<Neighbourhood>, &Vec<Kriged>)| {
+        place.as_ref().and_then(|_| Estimate::of(mixture, kriged, d))
+    };
+    places.iter().zip(&room.kriged).map(of).collect()
 }
 
 /// Unit normal and shape operator in the coordinates of space.

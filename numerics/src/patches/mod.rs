@@ -23,12 +23,11 @@ use super::machine::heap::vec_bytes;
 use super::observer::Observer;
 use super::points::cloud::Cloud;
 use super::points::sampling::{Sampling, median};
-use estimate::Estimate;
 use means::Support;
-use neighbourhood::{Neighbourhood, n_neighbours};
+use neighbourhood::n_neighbours;
 pub use pooled::MAX_MODELS;
-use pooled::{LENGTH_SCALE, STIFF, Weighted, candidates, pool, responsibilities, weighted};
-use regression::{Kriged, Model, n_terms};
+use pooled::{Kind, Weighted, pool, responsibilities};
+use regression::{Model, n_terms};
 use room::{Found, Purpose};
 
 pub use answers::{CurvatureDeviations, PatchGeometry};
@@ -58,6 +57,9 @@ const WORTH: f64 = 0.95;
 /// promised deviations of three quarters.
 const WORTH_OF_MEANS: f64 = 0.7;
 
+/// The same for a trend of fourth order instead of a quadric, where points are exact.
+const WORTH_OF_QUARTIC: f64 = 0.7;
+
 /// A ratio of the variance of the noise to that of the heights, and how common it is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NoiseRatio {
@@ -77,6 +79,8 @@ pub struct PatchHyperparameters {
     pub noise_ratios: Vec<NoiseRatio>,
     /// Mixture for the slopes where the surface is flat. Empty where there is no noise.
     pub flat_noise_ratios: Vec<NoiseRatio>,
+    /// Mixture for a trend of fourth order. Empty where points have noise, or a quadric is as sure.
+    pub quartic_noise_ratios: Vec<NoiseRatio>,
     /// σ: standard deviation of the noise of the points across the surface, unit L.
     pub noise: f64,
     /// Kernel of the heights: medians over the sites.
@@ -89,6 +93,8 @@ pub struct Patches {
     models: Vec<Weighted>,
     /// Models for the slopes where the surface is flat. Empty where there is no noise.
     stiff: Vec<Weighted>,
+    /// Models with a trend of fourth order, where points are exact and the surface is smooth enough.
+    quartic: Vec<Weighted>,
     /// Points, or means, in a neighbourhood. Below `n_terms(d) + 2`, no query has an answer.
     count: usize,
     noise: f64,
@@ -130,28 +136,50 @@ impl Patches {
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
         check_dimension(cloud.dimension())?;
-        let mut best: Option<(Vec<f64>, Self)> = None;
+        let mut best: Option<(Self, Vec<f64>)> = None;
         for group in GROUPS {
             if group > 1 && cloud.n_points() / group < LEAST_MEANS {
                 break;
             }
             let support = Support::of(group, cloud.clone(), sampling.clone(), observer)?;
-            let (deviations, patches) = Self::over(sites, support, observer)?;
+            let patches = Self::over(sites, support, observer)?;
+            let deviations = patches.deviations(sites, observer)?;
             let is_exact = patches.noise == 0.0;
-            let worth = if best.as_ref().is_some_and(|(_, best)| best.points_per_mean() == 1) {
+            let worth = if best.as_ref().is_some_and(|(best, _)| best.points_per_mean() == 1) {
                 WORTH_OF_MEANS
             } else {
                 WORTH
             };
-            let is_better = best.as_ref().is_none_or(|(least, _)| ratio(&deviations, least) < worth);
+            let is_better = best.as_ref().is_none_or(|(_, least)| ratio(&deviations, least) < worth);
             if is_better {
-                best = Some((deviations, patches));
+                best = Some((patches, deviations));
             }
             if !is_better || is_exact {
                 break;
             }
         }
-        best.map(|(_, patches)| patches).ok_or(NumericsError::EmptyCloud)
+        let (best, deviations) = best.ok_or(NumericsError::EmptyCloud)?;
+        best.with_quartic(&deviations, sites, observer)
+    }
+
+    /// Takes a trend of fourth order if points are exact and the largest deviations of curvatures at the
+    /// sites fall enough, from these.
+    fn with_quartic(
+        mut self,
+        deviations: &[f64],
+        sites: &Cloud,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        if self.noise > 0.0 || self.points_per_mean() > 1 || self.models.is_empty() {
+            return Ok(self);
+        }
+        self.quartic = self.pooled(Kind::Quartic, sites, observer)?;
+        if ratio(&self.deviations(sites, observer)?, deviations) < WORTH_OF_QUARTIC {
+            self.kernel = self.scales(&self.quartic, sites, observer)?.kernel;
+        } else {
+            self.quartic.clear();
+        }
+        Ok(self)
     }
 
     /// Regresses with hyperparameters that were learned before, of this cloud or of one that it is part of.
@@ -170,8 +198,9 @@ impl Patches {
         Ok(Self {
             count: n_neighbours(d, support.cloud().n_points()),
             support,
-            models: weighted(&hyperparameters.noise_ratios, LENGTH_SCALE, d),
-            stiff: weighted(&hyperparameters.flat_noise_ratios, STIFF, d),
+            models: Kind::Plain.mixture(&hyperparameters.noise_ratios),
+            stiff: Kind::Stiff.mixture(&hyperparameters.flat_noise_ratios),
+            quartic: Kind::Quartic.mixture(&hyperparameters.quartic_noise_ratios),
             noise: hyperparameters.noise,
             kernel: hyperparameters.kernel,
         })
@@ -187,88 +216,79 @@ impl Patches {
             points_per_mean: self.points_per_mean(),
             noise_ratios: ratios(&self.models),
             flat_noise_ratios: ratios(&self.stiff),
+            quartic_noise_ratios: ratios(&self.quartic),
             noise: self.noise,
             kernel: self.kernel,
         }
     }
 
-    /// Learns the hyperparameters on one support. Also returns the largest deviation of a principal curvature
-    /// at each site, infinite where there is none, which [`Patches::learned_at`] compares between group
-    /// sizes.
-    fn over(
-        sites: &Cloud,
-        support: Support,
-        observer: &dyn Observer,
-    ) -> Result<(Vec<f64>, Self), NumericsError> {
+    /// Learns the hyperparameters on one support.
+    fn over(sites: &Cloud, support: Support, observer: &dyn Observer) -> Result<Self, NumericsError> {
         let d = sites.dimension();
         let count = n_neighbours(d, support.cloud().n_points());
         let mut patches = Self {
             support,
             models: Vec::new(),
             stiff: Vec::new(),
+            quartic: Vec::new(),
             count,
             noise: 0.0,
             kernel: PatchKernel::default(),
         };
         if count < n_terms(d) + 2 {
-            return Ok((vec![f64::INFINITY; sites.n_points()], patches));
+            return Ok(patches);
         }
-        patches.models = patches.pooled(LENGTH_SCALE, sites, observer)?;
-        let chosen: Vec<Model> = patches.models.iter().map(|weighted| weighted.model).collect();
-        let whole = patches.krige_each(sites, &chosen, Purpose::Prediction, observer)?;
-        let summary =
-            |found: &Option<Found>| found.as_ref().and_then(|(at, kriged)| patches.summary(at, kriged, d));
-        let estimates: Vec<Option<(f64, f64, f64, f64)>> = whole.iter().map(summary).collect();
-        let middle =
-            |of: fn(&(f64, f64, f64, f64)) -> f64| median(estimates.iter().flatten().map(of).collect());
-        let deviations = estimates.iter().map(|e| e.map_or(f64::INFINITY, |e| e.0)).collect();
-        patches.noise = middle(|e| e.1).unwrap_or(0.0).sqrt();
-        patches.kernel = PatchKernel {
-            length_scale: middle(|e| e.2).unwrap_or(1.0),
-            variance: middle(|e| e.3).unwrap_or(1.0),
-        };
+        patches.models = patches.pooled(Kind::Plain, sites, observer)?;
+        Scales { noise: patches.noise, kernel: patches.kernel } =
+            patches.scales(&patches.models, sites, observer)?;
         if patches.noise > 0.0 {
-            patches.stiff = patches.pooled(STIFF, sites, observer)?;
+            patches.stiff = patches.pooled(Kind::Stiff, sites, observer)?;
         }
-        Ok((deviations, patches))
+        Ok(patches)
     }
 
-    /// Returns the mixture of models of one length scale that makes the neighbourhoods of these queries most
-    /// likely.
+    /// Returns the mixture of models of one kind that makes the neighbourhoods of these queries most likely.
     fn pooled(
         &self,
-        length_scale: f64,
+        kind: Kind,
         queries: &Cloud,
         observer: &dyn Observer,
     ) -> Result<Vec<Weighted>, NumericsError> {
-        let candidates = candidates(n_terms(queries.dimension()), length_scale);
+        let candidates = kind.candidates();
         let found = self.krige_each(queries, &candidates, Purpose::Likelihood, observer)?;
         let logs = |(_, kriged): &Found| kriged.iter().map(|k| k.log_likelihood).collect();
-        Ok(pool(&candidates, &found.iter().flatten().map(logs).collect::<Vec<Vec<f64>>>()))
+        Ok(pool(kind, &candidates, &found.iter().flatten().map(logs).collect::<Vec<Vec<f64>>>()))
     }
 
-    /// Returns the largest deviation of a principal curvature (1/L), the variance of the noise (L²), ℓ (L)
-    /// and s² (L²) of one neighbourhood.
-    fn summary(&self, at: &Neighbourhood, kriged: &[Kriged], d: usize) -> Option<(f64, f64, f64, f64)> {
-        let estimate = Estimate::of(&self.models, kriged, d)?;
-        let deviations = estimate.curvatures(d, true).principal;
-        let shares = responsibilities(&self.models, kriged);
-        let (mut length_scale, mut variance, mut noise) = (0.0, 0.0, 0.0);
-        for ((share, kriged), weighted) in
-            shares.iter().zip(kriged).zip(&self.models).filter(|((s, _), _)| **s > 0.0)
-        {
-            length_scale += share * weighted.model.length_scale * at.radius;
-            variance += share * kriged.scale * at.radius.powi(2);
-            // Noise ratios up to 1e-7 are rounding and count as no noise.
-            noise +=
-                share * if weighted.model.noise > 1e-7 { kriged.scale * weighted.model.noise } else { 0.0 };
-        }
-        Some((
-            deviations.iter().copied().fold(0.0, f64::max) / at.radius,
-            noise * at.radius.powi(2),
-            length_scale,
-            variance,
-        ))
+    /// Returns the largest deviation of a principal curvature at each site, 1/L, infinite where there is
+    /// none.
+    fn deviations(&self, sites: &Cloud, observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
+        let PatchGeometry { is_known, curvatures, .. } = self.at(sites, true, true, observer)?;
+        let of_curvatures = curvatures.unwrap_or_default().principal;
+        let rows = is_known.iter().zip(of_curvatures.chunks_exact(sites.dimension() - 1));
+        let largest = |row: &[f64]| row.iter().copied().fold(0.0, f64::max);
+        Ok(rows.map(|(is_known, row)| if *is_known { largest(row) } else { f64::INFINITY }).collect())
+    }
+
+    /// Returns noise and kernel of the heights by these models: medians over the sites.
+    fn scales(
+        &self,
+        models: &[Weighted],
+        sites: &Cloud,
+        observer: &dyn Observer,
+    ) -> Result<Scales, NumericsError> {
+        let candidates: Vec<Model> = models.iter().map(|weighted| weighted.model).collect();
+        let found = self.krige_each(sites, &candidates, Purpose::Likelihood, observer)?;
+        let at_sites: Vec<[f64; 3]> =
+            found.iter().flatten().filter_map(|found| scales(models, found)).collect();
+        let middle = |at: usize| median(at_sites.iter().map(|scales| scales[at]).collect());
+        Ok(Scales {
+            noise: middle(0).unwrap_or(0.0).sqrt(),
+            kernel: PatchKernel {
+                length_scale: middle(1).unwrap_or(1.0),
+                variance: middle(2).unwrap_or(1.0),
+            },
+        })
     }
 
     /// Returns the most points of which regressions see the mean, 1 where they see the points themselves.
@@ -288,8 +308,35 @@ impl Patches {
 
     /// Bytes held on the heap besides the cloud and its sampling.
     pub fn n_bytes(&self) -> usize {
-        self.support.n_bytes() + vec_bytes(&self.models) + vec_bytes(&self.stiff)
+        self.support.n_bytes()
+            + [&self.models, &self.stiff, &self.quartic].map(vec_bytes).iter().sum::<usize>()
     }
+}
+
+/// Noise of the points across the surface, and kernel of the heights.
+struct Scales {
+    /// Standard deviation, unit L.
+    noise: f64,
+    kernel: PatchKernel,
+}
+
+/// Returns the variance of the noise (L²), ℓ (L) and s² (L²) of one neighbourhood, `None` where no model has
+/// an answer.
+fn scales(models: &[Weighted], (place, kriged): &Found) -> Option<[f64; 3]> {
+    let shares = responsibilities(models, kriged);
+    if shares.iter().all(|share| *share == 0.0) {
+        return None;
+    }
+    let (mut noise, mut length_scale, mut variance) = (0.0, 0.0, 0.0);
+    for ((share, kriged), Weighted { model, .. }) in shares.iter().zip(kriged).zip(models) {
+        if *share > 0.0 {
+            length_scale += share * model.length_scale * place.radius;
+            variance += share * kriged.scale * place.radius.powi(2);
+            // Ratios up to 1e-7 are rounding and count as no noise.
+            noise += share * if model.noise > 1e-7 { kriged.scale * model.noise } else { 0.0 };
+        }
+    }
+    Some([noise * place.radius.powi(2), length_scale, variance])
 }
 
 /// Median ratio of deviations at the same sites, infinite where none is finite.

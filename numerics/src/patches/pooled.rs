@@ -1,7 +1,7 @@
 //! Hyperparameters from the likelihood pooled over a sample of neighbourhoods.
 
 use super::NoiseRatio;
-use super::regression::{Kriged, Model, n_terms};
+use super::regression::{Kriged, Model, Trend};
 use crate::kernel::Family;
 
 /// Order of Matérn's kernel: ν = 9/2. Kriged curvatures of analytic surfaces are then as far off as their
@@ -13,7 +13,7 @@ const ORDER: u8 = 4;
 /// The radius follows the curvature, so one ratio serves surfaces of all sizes. Shorter length scales mistake
 /// noise that neighbours share for shape. Longer ones promise deviations that are too small on scans
 /// (docs/error-bars.md).
-pub(crate) const LENGTH_SCALE: f64 = 1.4;
+const LENGTH_SCALE: f64 = 1.4;
 
 /// Length scale of the stiff models, in units of the radius, for slopes where the surface is flat and the
 /// cloud has noise.
@@ -21,13 +21,16 @@ pub(crate) const LENGTH_SCALE: f64 = 1.4;
 /// Neighbours of a scan have some of their noise in common. The likelihood takes it for shape, and the short
 /// length scale takes it for slopes. The stiffer process averages it, and has no bias where there is nothing
 /// but noise (docs/error-bars.md).
-pub(crate) const STIFF: f64 = 4.0;
+const STIFF: f64 = 4.0;
 
 /// Candidate ratios of the variance of the noise to that of the process.
 const NOISES: [f64; 12] = [0.0, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0];
 
-/// Share of the neighbourhoods below which a model is dropped.
+/// Share of the neighbourhoods below which a model is dropped, and that for a trend of fourth order. Where
+/// points are exact, what it leaves of single neighbourhoods looks like noise by chance. Each model takes as
+/// long as the first.
 const LEAST_SHARE: f64 = 0.01;
+const LEAST_SHARE_OF_QUARTIC: f64 = 0.1;
 /// Greatest number of models kept.
 pub const MAX_MODELS: usize = 6;
 
@@ -41,30 +44,53 @@ pub(crate) struct Weighted {
     pub log_share: f64,
 }
 
-/// Candidate models of one length scale, among which the likelihood decides.
-pub(crate) fn candidates(n_trend: usize, length_scale: f64) -> Vec<Model> {
-    NOISES.map(|noise| model(noise, length_scale, n_trend)).to_vec()
+/// What models of a mixture have in common.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// A quadric as the trend.
+    Plain,
+    /// The same with the long length scale, [`STIFF`].
+    Stiff,
+    /// A trend of fourth order.
+    Quartic,
 }
 
-/// The mixture of models with these noise ratios, for regressions in a dimension.
-pub(crate) fn weighted(ratios: &[NoiseRatio], length_scale: f64, dimension: usize) -> Vec<Weighted> {
-    let of = |&NoiseRatio { ratio, log_share }: &NoiseRatio| Weighted {
-        model: model(ratio, length_scale, n_terms(dimension)),
-        log_share,
-    };
-    ratios.iter().map(of).collect()
+impl Kind {
+    /// Candidates among which the likelihood decides.
+    pub(crate) fn candidates(self) -> Vec<Model> {
+        NOISES.map(|noise| self.model(noise)).to_vec()
+    }
+
+    /// The mixture with these noise ratios.
+    pub(crate) fn mixture(self, ratios: &[NoiseRatio]) -> Vec<Weighted> {
+        let of =
+            |&NoiseRatio { ratio, log_share }: &NoiseRatio| Weighted { model: self.model(ratio), log_share };
+        ratios.iter().map(of).collect()
+    }
+
+    fn least_share(self) -> f64 {
+        match self {
+            Self::Plain | Self::Stiff => LEAST_SHARE,
+            Self::Quartic => LEAST_SHARE_OF_QUARTIC,
+        }
+    }
+
+    fn model(self, noise: f64) -> Model {
+        let (length_scale, trend) = match self {
+            Self::Plain => (LENGTH_SCALE, Trend::Quadric),
+            Self::Stiff => (STIFF, Trend::Quadric),
+            Self::Quartic => (LENGTH_SCALE, Trend::Quartic),
+        };
+        Model { family: Family::Matern { order: ORDER }, length_scale, noise, trend }
+    }
 }
 
-fn model(noise: f64, length_scale: f64, n_trend: usize) -> Model {
-    Model { family: Family::Matern { order: ORDER }, length_scale, noise, n_trend }
-}
-
-/// Finds the mixture of the candidates that makes a sample of neighbourhoods most likely.
+/// Finds the mixture of candidates of one kind that makes a sample of neighbourhoods most likely.
 ///
 /// `log_likelihoods` is `[neighbourhoods][models]`. The shares come from expectation and maximization
 /// (nonparametric maximum likelihood: Laird 1978).
-pub(crate) fn pool(candidates: &[Model], log_likelihoods: &[Vec<f64>]) -> Vec<Weighted> {
-    let n = candidates.len();
+pub(crate) fn pool(kind: Kind, candidates: &[Model], log_likelihoods: &[Vec<f64>]) -> Vec<Weighted> {
+    let (n, least_share) = (candidates.len(), kind.least_share());
     let mut shares = vec![1.0 / n as f64; n];
     for _ in 0..STEPS {
         let mut sums = vec![0.0; n];
@@ -82,7 +108,7 @@ pub(crate) fn pool(candidates: &[Model], log_likelihoods: &[Vec<f64>]) -> Vec<We
     }
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|&a, &b| shares[b].total_cmp(&shares[a]));
-    let kept = order.into_iter().enumerate().filter(|&(rank, at)| rank == 0 || shares[at] > LEAST_SHARE);
+    let kept = order.into_iter().enumerate().filter(|&(rank, at)| rank == 0 || shares[at] > least_share);
     let kept = kept.take(MAX_MODELS).map(|(_, at)| at);
     kept.map(|at| Weighted { model: candidates[at], log_share: shares[at].ln() }).collect()
 }

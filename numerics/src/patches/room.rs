@@ -55,6 +55,10 @@ impl<'a> Room<'a> {
         }
     }
 
+    pub(super) fn dimension(&self) -> usize {
+        self.batch.dimension
+    }
+
     /// Fills the lanes with the neighbourhoods of a range of queries.
     pub(super) fn put(&mut self, queries: &Cloud, range: Range<usize>) -> Vec<Option<Neighbourhood>> {
         let support = &self.patches.support;
@@ -82,7 +86,7 @@ impl<'a> Room<'a> {
     }
 
     /// Solves the current batch for each model and stores the results in `kriged`.
-    pub(super) fn krige(&mut self, models: &[Model], purpose: Purpose) {
+    pub(super) fn krige<'m>(&mut self, models: impl IntoIterator<Item = &'m Model>, purpose: Purpose) {
         self.kriged.iter_mut().for_each(Vec::clear);
         if self.is_empty {
             return;

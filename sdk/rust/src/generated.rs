@@ -881,6 +881,10 @@ is known.*/
         pub noise_ratios: ::std::vec::Vec<NoiseRatio>,
         ///Most points that a regression averages before it sees them. 1 where it sees the points themselves.
         pub points_per_mean: ::std::num::NonZeroU64,
+        /**Mixture of noise ratios beside polynomials of fourth order. Empty where points have noise, or quadrics
+are as sure.*/
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub quartic_noise_ratios: ::std::vec::Vec<NoiseRatio>,
         ///Half the diagonal of the bounding box of the cloud, length. Beside it, small curvatures count as 0.
         pub radius: f64,
         ///Variance of these heights, length squared.
@@ -6378,6 +6382,10 @@ landmarks are not enough.*/
                 ::std::num::NonZeroU64,
                 ::std::string::String,
             >,
+            quartic_noise_ratios: ::std::result::Result<
+                ::std::vec::Vec<super::NoiseRatio>,
+                ::std::string::String,
+            >,
             radius: ::std::result::Result<f64, ::std::string::String>,
             variance: ::std::result::Result<f64, ::std::string::String>,
         }
@@ -6396,6 +6404,7 @@ landmarks are not enough.*/
                     points_per_mean: Err(
                         "no value supplied for points_per_mean".to_string(),
                     ),
+                    quartic_noise_ratios: Ok(Default::default()),
                     radius: Err("no value supplied for radius".to_string()),
                     variance: Err("no value supplied for variance".to_string()),
                 }
@@ -6480,6 +6489,20 @@ landmarks are not enough.*/
                     });
                 self
             }
+            pub fn quartic_noise_ratios<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::NoiseRatio>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.quartic_noise_ratios = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for quartic_noise_ratios: {e}"
+                        )
+                    });
+                self
+            }
             pub fn radius<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<f64>,
@@ -6517,6 +6540,7 @@ landmarks are not enough.*/
                     noise_deviation: value.noise_deviation?,
                     noise_ratios: value.noise_ratios?,
                     points_per_mean: value.points_per_mean?,
+                    quartic_noise_ratios: value.quartic_noise_ratios?,
                     radius: value.radius?,
                     variance: value.variance?,
                 })
@@ -6531,6 +6555,7 @@ landmarks are not enough.*/
                     noise_deviation: Ok(value.noise_deviation),
                     noise_ratios: Ok(value.noise_ratios),
                     points_per_mean: Ok(value.points_per_mean),
+                    quartic_noise_ratios: Ok(value.quartic_noise_ratios),
                     radius: Ok(value.radius),
                     variance: Ok(value.variance),
                 }

@@ -22,6 +22,11 @@ pub struct Hyperparameters {
     /// Mixture of noise ratios for normals where the surface is flat. Empty where there is no noise.
     #[schema(max_items = 6)]
     pub flat_noise_ratios: Vec<NoiseRatio>,
+    /// Mixture of noise ratios beside polynomials of fourth order. Empty where points have noise, or quadrics
+    /// are as sure.
+    #[serde(default)]
+    #[schema(max_items = 6)]
+    pub quartic_noise_ratios: Vec<NoiseRatio>,
     /// Standard deviation of the noise of the points across the surface, length.
     #[schema(minimum = 0.0)]
     pub noise_deviation: f64,
@@ -64,6 +69,7 @@ impl Hyperparameters {
             points_per_mean: regression.points_per_mean,
             noise_ratios: ratios(&regression.noise_ratios),
             flat_noise_ratios: ratios(&regression.flat_noise_ratios),
+            quartic_noise_ratios: ratios(&regression.quartic_noise_ratios),
             noise_deviation: regression.noise,
             length_scale: regression.kernel.length_scale,
             variance: regression.kernel.variance,
@@ -100,6 +106,7 @@ impl Hyperparameters {
             points_per_mean: self.points_per_mean,
             noise_ratios: ratios(&self.noise_ratios, "noise_ratios")?,
             flat_noise_ratios: ratios(&self.flat_noise_ratios, "flat_noise_ratios")?,
+            quartic_noise_ratios: ratios(&self.quartic_noise_ratios, "quartic_noise_ratios")?,
             noise: self.noise_deviation,
             kernel: PatchKernel { length_scale: self.length_scale, variance: self.variance },
         };

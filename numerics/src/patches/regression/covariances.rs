@@ -3,7 +3,7 @@
 
 use pulp::Simd;
 
-use super::{Factored, extra_rows};
+use super::Factored;
 use crate::kernel::in_place::{Covariances, CovariancesAndSlopes};
 use crate::machine::lanes::triangle;
 use crate::machine::registers::{BLOCK, Pack};
@@ -61,13 +61,39 @@ impl<S: Simd> Factored<'_, S> {
             }
             for term in k + 1..self.p {
                 let product = self.of(&self.batch.products, (term - k - 1) * n + j);
-                let product = if term < self.p_trend { product * mask } else { zero };
-                self.lower.put(n + term, j, product);
+                self.lower.put(n + term, j, product * mask);
             }
-            self.lower.put(n + self.p, j, self.coordinate(k, j) * mask);
-            self.lower.put(n + self.p + 1, j, self.of(&self.batch.entailed, j) * mask);
-            for row in n + self.p + 2..n + extra_rows(k + 1) {
+            if self.p_trend > self.p {
+                self.fill_beyond_quadric(j);
+            }
+            let data = n + self.p_trend;
+            self.lower.put(data, j, self.coordinate(k, j) * mask);
+            self.lower.put(data + 1, j, self.of(&self.batch.entailed, j) * mask);
+            for row in data + 2..n + self.n_extra {
                 self.lower.put(row, j, zero);
+            }
+        }
+    }
+
+    /// Writes the monomials of third and fourth order of one place: `t_a t_b t_c`, and after each of them
+    /// `t_a t_b t_c t_e` for e ≥ c.
+    #[inline(always)]
+    fn fill_beyond_quadric(&mut self, j: usize) {
+        let k = self.k;
+        let mut row = self.n + self.p;
+        for a in 0..k {
+            let first = self.coordinate(a, j) * self.mask(j);
+            for b in a..k {
+                let second = first * self.coordinate(b, j);
+                for c in b..k {
+                    let third = second * self.coordinate(c, j);
+                    self.lower.put(row, j, third);
+                    row += 1;
+                    for e in c..k {
+                        self.lower.put(row, j, third * self.coordinate(e, j));
+                        row += 1;
+                    }
+                }
             }
         }
     }
@@ -85,7 +111,7 @@ impl<S: Simd> Factored<'_, S> {
         let mut q = [zero; BLOCK];
         let mut first = [zero; BLOCK];
         let mut second = [zero; BLOCK];
-        let base = n + self.p + 2;
+        let base = n + self.p_trend + 2;
         let mut start = 0;
         while start < n {
             let end = (start + per_block).min(n);

@@ -2,7 +2,7 @@
 //!
 //! Around each query the surface is a height `z(t) = f(t)ᵀβ + g(t) + ε` over d − 1 tangential coordinates. It
 //! has three parts:
-//! - a quadratic trend with a flat prior,
+//! - a polynomial trend with a flat prior,
 //! - a Gaussian process `g` with covariance `s² φ(|t − t′|²/ℓ²)`,
 //! - noise of variance `s²τ²w_j` at point j, where w_j is 1 over the number of points whose mean it is.
 //!
@@ -26,7 +26,7 @@ use crate::machine::lanes::{Layout, Lower, MAX_LANES, Rounding, Workspace};
 use crate::machine::registers::{BLOCK, Pack};
 
 pub(crate) use batch::Batch;
-pub(crate) use model::Model;
+pub(crate) use model::{Model, Trend};
 
 /// Rows and columns of a tile, which are solved for at once.
 const ROWS: usize = 4;
@@ -44,7 +44,7 @@ pub(crate) const fn n_terms(dimension: usize) -> usize {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Kriged {
     /// Logarithm of the restricted likelihood, with s² integrated out under the prior 1/s², up to a constant
-    /// of the patch. NaN where K is not positive definite in float64.
+    /// of the patch. NaN where K is not positive definite in float64, or points are too few for the trend.
     pub log_likelihood: f64,
     /// Scale s², estimated as `q/(n − p)`.
     pub scale: f64,
@@ -63,20 +63,16 @@ pub(crate) type Squares = SmallVec<[f64; 36]>;
 
 /// Makes memory for the factorization of one batch.
 pub(crate) fn workspace(dimension: usize, count: usize) -> Workspace {
-    let n_rows = extra_rows(dimension);
-    let n_registers = scratch(dimension, count).next_multiple_of(BLOCK);
-    // Inner products of those rows, and a system of p unknowns with as many right-hand sides.
+    // The largest trend takes most.
+    let n_rows = extra_rows(dimension, Trend::Quartic);
+    let n_registers = Layout::dense(count).row(count + n_rows).next_multiple_of(BLOCK);
+    // Inner products of those rows, and a system with an unknown for each term of the trend.
     Workspace::new(n_registers + 2 * n_rows * n_rows)
 }
 
-/// The place of the registers after the rows.
-fn scratch(dimension: usize, count: usize) -> usize {
-    Layout::dense(count).row(count + extra_rows(dimension))
-}
-
 /// Number of rows below K: Fᵀ, zᵀ, eᵀ and Cᵀ, rounded up to whole tiles.
-fn extra_rows(dimension: usize) -> usize {
-    (2 * n_terms(dimension) + 2).next_multiple_of(ROWS)
+fn extra_rows(dimension: usize, trend: Trend) -> usize {
+    (trend.n_terms(dimension) + 2 + n_terms(dimension)).next_multiple_of(ROWS)
 }
 
 /// The computation that kriges every lane of a batch with one model.
@@ -93,18 +89,16 @@ impl WithSimd for Krige<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let d = self.batch.dimension;
+        let (d, layout) = (self.batch.dimension, Layout::dense(self.batch.count));
+        let n_extra = extra_rows(d, self.model.trend);
         let system = Factored {
-            lower: Lower {
-                simd,
-                layout: Layout::dense(self.batch.count),
-                registers: self.workspace.registers::<S>(),
-            },
+            lower: Lower { simd, layout, registers: self.workspace.registers::<S>() },
             k: d - 1,
             n: self.batch.count,
             p: n_terms(d),
-            p_trend: self.model.n_trend,
-            scratch: scratch(d, self.batch.count),
+            p_trend: self.model.trend.n_terms(d),
+            n_extra,
+            scratch: layout.row(self.batch.count + n_extra),
             batch: self.batch,
             model: self.model,
         };
@@ -114,7 +108,7 @@ impl WithSimd for Krige<'_> {
 
 /// A batch during its factorization.
 ///
-/// Below the triangle of K come the rows of Fᵀ `[p]`, zᵀ, eᵀ (the entailed heights) and Cᵀ `[p]`.
+/// Below the triangle of K come the rows of Fᵀ `[p_trend]`, zᵀ, eᵀ (the entailed heights) and Cᵀ `[p]`.
 struct Factored<'a, S: Simd> {
     lower: Lower<'a, S>,
     /// Tangential coordinates, d − 1.
@@ -123,8 +117,10 @@ struct Factored<'a, S: Simd> {
     n: usize,
     /// Terms of a quadric.
     p: usize,
-    /// Terms of the trend, at most p.
+    /// Terms of the trend, those of a quadric first.
     p_trend: usize,
+    /// Rows below K.
+    n_extra: usize,
     /// The place of the registers after the rows.
     scratch: usize,
     batch: &'a Batch,
@@ -139,7 +135,7 @@ impl<S: Simd> Factored<'_, S> {
         if predicts {
             self.fill_covariances();
         }
-        let n_rows = if predicts { extra_rows(self.k + 1) } else { (self.p + 2).next_multiple_of(ROWS) };
+        let n_rows = if predicts { self.n_extra } else { (self.p_trend + 2).next_multiple_of(ROWS) };
         self.lower.factorize::<ROWS, COLUMNS>(self.n..self.n + n_rows, &Unguarded);
         self.solve(predicts)
     }

@@ -2,7 +2,7 @@
 
 use smallvec::SmallVec;
 
-use super::Squares;
+use super::{Squares, n_terms};
 use crate::kernel::Family;
 use crate::kernel::in_place::Scaling;
 use crate::machine::lanes::triangle;
@@ -16,8 +16,35 @@ pub(crate) struct Model {
     pub length_scale: f64,
     /// τ²: variance of the noise of a point divided by s².
     pub noise: f64,
-    /// Number of terms of the trend: 1 + (d − 1) for a plane, d(d+1)/2 for a quadric.
-    pub n_trend: usize,
+    pub trend: Trend,
+}
+
+/// Polynomials over the tangent plane whose coefficients have a flat prior.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Trend {
+    /// Up to second order.
+    Quadric,
+    /// Up to fourth order.
+    Quartic,
+}
+
+impl Trend {
+    /// Number of monomials, the [`n_terms`] of a quadric first.
+    pub(crate) const fn n_terms(self, dimension: usize) -> usize {
+        match self {
+            Self::Quadric => n_terms(dimension),
+            Self::Quartic => n_terms(dimension) * (dimension + 2) * (dimension + 3) / 12,
+        }
+    }
+
+    /// Degrees of freedom that it must leave of a neighbourhood. Where a trend of fourth order leaves fewer,
+    /// a quadric says more.
+    pub(super) fn least_freedom(self) -> f64 {
+        match self {
+            Self::Quadric => 1.0,
+            Self::Quartic => 5.0,
+        }
+    }
 }
 
 impl Model {

@@ -2,12 +2,14 @@
 
 use super::doubt::Doubt;
 use super::*;
-use crate::kernel::{Family, Kernel};
+use crate::kernel::Family;
 use crate::machine::instruction_set::InstructionSet;
 use crate::testing::Random;
 
-const N: usize = 14;
+const N: usize = 22;
 const P: usize = n_terms(3);
+/// Terms of fourth order and less.
+const QUARTIC: usize = 15;
 const LENGTH_SCALE: f64 = 0.8;
 const NOISE: f64 = 0.01;
 
@@ -31,9 +33,13 @@ impl Points {
         Self { places, heights, entailed, weights }
     }
 
-    fn terms(&self, j: usize) -> [f64; P] {
+    /// The first M of the terms up to fourth order.
+    fn terms<const M: usize>(&self, j: usize) -> [f64; M] {
         let [s, t] = self.places[j];
-        [1.0, s, t, 0.5 * s * s, s * t, 0.5 * t * t]
+        let quadric = [1.0, s, t, 0.5 * s * s, s * t, 0.5 * t * t];
+        let beyond = [(3, 0), (4, 0), (3, 1), (2, 1), (2, 2), (1, 2), (1, 3), (0, 3), (0, 4)];
+        let of = |(a, b): (i32, i32)| s.powi(a) * t.powi(b);
+        std::array::from_fn(|i| if i < P { quadric[i] } else { of(beyond[i - P]) })
     }
 
     /// Makes a batch with this neighbourhood in all lanes and `n_empty` empty places at the end.
@@ -47,7 +53,7 @@ impl Points {
                 batch.set_coordinate(2, j, lane, self.heights[j]);
                 batch.set_entailed(j, lane, self.entailed[j]);
                 batch.set_weight(j, lane, self.weights[j]);
-                (0..3).for_each(|term| batch.set_product(term, j, lane, self.terms(j)[3 + term]));
+                (0..3).for_each(|term| batch.set_product(term, j, lane, self.terms::<P>(j)[3 + term]));
             }
             batch.keep(lane, N);
         }
@@ -104,8 +110,8 @@ fn dot<const M: usize>(x: &[f64; M], y: &[f64; M]) -> f64 {
     x.iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
-/// Expected [`Kriged`], by the formulas.
-fn written_out(points: &Points) -> Kriged {
+/// Expected [`Kriged`], by the formulas, with M terms of the trend.
+fn written_out<const M: usize>(points: &Points) -> Kriged {
     let covariance = std::array::from_fn(|i| {
         std::array::from_fn(|j| {
             let noise = if i == j { NOISE * points.weights[i] + 1e-13 } else { 0.0 };
@@ -113,19 +119,19 @@ fn written_out(points: &Points) -> Kriged {
         })
     });
     let (inverse_k, log_k) = inverse::<N>(covariance);
-    let trend: [[f64; N]; P] = std::array::from_fn(|i| std::array::from_fn(|j| points.terms(j)[i]));
+    let trend: [[f64; N]; M] = std::array::from_fn(|i| std::array::from_fn(|j| points.terms::<M>(j)[i]));
     let solved = trend.map(|column| times(&inverse_k, &column));
     let gram = std::array::from_fn(|i| std::array::from_fn(|j| dot(&trend[i], &solved[j])));
-    let (inverse_a, log_a) = inverse::<P>(gram);
+    let (inverse_a, log_a) = inverse::<M>(gram);
     // Coefficients of the trend for y, and K⁻¹ times the residual of y.
     let fit = |y: &[f64; N]| {
         let coefficients = times(&inverse_a, &solved.map(|column| dot(&column, y)));
-        let rest = std::array::from_fn(|j| y[j] - dot(&points.terms(j), &coefficients));
+        let rest = std::array::from_fn(|j| y[j] - dot(&points.terms::<M>(j), &coefficients));
         (coefficients, times(&inverse_k, &rest))
     };
     let (beta_z, rest_z) = fit(&points.heights);
     let (beta_e, rest_e) = fit(&points.entailed);
-    let freedom = (N - P) as f64;
+    let freedom = (N - M) as f64;
     let doubt = Doubt::of(
         dot(&points.heights, &rest_z),
         dot(&points.entailed, &rest_z),
@@ -134,14 +140,13 @@ fn written_out(points: &Points) -> Kriged {
     );
     let by_point = points.places.map(|t| derivatives(|x| matern(x, t)));
     let cross: [[f64; N]; P] = std::array::from_fn(|i| std::array::from_fn(|j| by_point[j][i]));
-    let mean = |i: usize, beta: &[f64; P], rest: &[f64; N]| beta[i] + dot(&cross[i], rest);
+    let mean = |i: usize, beta: &[f64; M], rest: &[f64; N]| beta[i] + dot(&cross[i], rest);
     let effect: [f64; P] = std::array::from_fn(|i| mean(i, &beta_e, &rest_e));
-    let unexplained: [[f64; P]; P] = std::array::from_fn(|i| {
+    let unexplained: [[f64; M]; P] = std::array::from_fn(|i| {
         std::array::from_fn(|l| f64::from(u8::from(i == l)) - dot(&solved[l], &cross[i]))
     });
     let scale = doubt.quadratic / freedom;
-    let model = Model { family: kernel().family(), length_scale: LENGTH_SCALE, noise: NOISE, n_trend: P };
-    let prior = model::prior_covariance(&model, 2);
+    let prior = model::prior_covariance(&model(Trend::Quadric), 2);
     let entry = |i: usize, j: usize| {
         let explained = dot(&cross[i], &times(&inverse_k, &cross[j]));
         let of_trend = dot(&unexplained[i], &times(&inverse_a, &unexplained[j]));
@@ -156,17 +161,20 @@ fn written_out(points: &Points) -> Kriged {
     }
 }
 
-fn kernel() -> Kernel {
-    Kernel::new(Family::Matern { order: 4 }, 1.0, 1.0).unwrap()
+fn model(trend: Trend) -> Model {
+    Model { family: Family::Matern { order: 4 }, length_scale: LENGTH_SCALE, noise: NOISE, trend }
 }
 
 #[test]
 fn lanes_say_what_the_formulas_say() {
     let set = InstructionSet::best();
-    let model = Model { family: kernel().family(), length_scale: LENGTH_SCALE, noise: NOISE, n_trend: P };
-    for seed in 0..5 {
+    for seed in 0..10 {
         let points = Points::random(seed);
-        let expected = written_out(&points);
+        let (trend, expected) = match seed % 2 {
+            0 => (Trend::Quadric, written_out::<P>(&points)),
+            _ => (Trend::Quartic, written_out::<QUARTIC>(&points)),
+        };
+        let model = model(trend);
         for n_empty in [0, 4] {
             let batch = points.batch(set.n_lanes(), n_empty);
             let mut workspace = workspace(3, N + n_empty);
@@ -190,8 +198,7 @@ fn lanes_say_what_the_formulas_say() {
 
 #[test]
 fn prior_covariances_are_derivatives_of_the_kernel() {
-    let model = Model { family: kernel().family(), length_scale: LENGTH_SCALE, noise: NOISE, n_trend: P };
-    let prior = model::prior_covariance(&model, 2);
+    let prior = model::prior_covariance(&model(Trend::Quadric), 2);
     // Derivative ∂_i in x and ∂_j in y of k(x, y) at 0: differences of differences.
     for i in 0..P {
         let row = derivatives(|y| derivatives(|x| matern(x, y))[i]);

@@ -8,101 +8,145 @@ use super::model::prior_covariance;
 use super::{Factored, Kriged, LEAST_HEIGHT};
 use crate::machine::lanes::{MAX_LANES, triangle};
 
+/// Places of registers after the rows.
+struct Places {
+    /// Inner products of the rows, `[n_kept, n_kept]`, of which the lower triangle is used.
+    products: usize,
+    n_kept: usize,
+    /// Rᵀ, with the right-hand sides in the columns beyond it, `[p_trend, width]`.
+    small: usize,
+    width: usize,
+}
+
+impl Places {
+    #[inline(always)]
+    fn product(&self, i: usize, j: usize) -> usize {
+        self.products + i.max(j) * self.n_kept + i.min(j)
+    }
+
+    #[inline(always)]
+    fn small(&self, i: usize, column: usize) -> usize {
+        self.small + i * self.width + column
+    }
+}
+
 impl<S: Simd> Factored<'_, S> {
     /// Computes the results of all lanes from inner products of the rows below the factor.
     #[inline(always)]
     pub(super) fn solve(&mut self, predicts: bool) -> SmallVec<[Kriged; MAX_LANES]> {
-        let (p, p_trend) = (self.p, self.p_trend);
-        let n_kept = if predicts { 2 * p + 2 } else { p + 2 };
-        let start = self.scratch;
-        for i in 0..n_kept {
+        let width = self.p_trend + 2 + self.p;
+        let n_kept = if predicts { width } else { self.p_trend + 2 };
+        let places = Places { products: self.scratch, n_kept, small: self.scratch + n_kept * n_kept, width };
+        self.solve_trend(&places);
+        self.leave_residuals(&places);
+        if predicts {
+            self.predict(&places);
+        }
+        self.lanes(&places, predicts)
+    }
+
+    #[inline(always)]
+    fn multiply(&mut self, i: usize, j: usize, places: &Places) {
+        let product = self.lower.product(self.lower.row(self.n + i), self.lower.row(self.n + j));
+        self.lower.set(places.product(i, j), product);
+    }
+
+    /// Factorizes A = FᵀK⁻¹F = RRᵀ, and computes R⁻¹(b, U) with b = FᵀK⁻¹z and U = I − FᵀK⁻¹C, row by row.
+    #[inline(always)]
+    fn solve_trend(&mut self, places: &Places) {
+        let data = self.p_trend..self.p_trend + 2;
+        for i in 0..places.n_kept {
+            // Closures would not be compiled for the registers of this machine.
             for j in 0..=i {
-                let product = self.lower.product(self.lower.row(self.n + i), self.lower.row(self.n + j));
-                self.lower.set(start + i * n_kept + j, product);
+                if !data.contains(&j) {
+                    self.multiply(i, j, places);
+                }
             }
         }
-        // A = FᵀK⁻¹F = RRᵀ, then R⁻¹(b, U) with b = FᵀK⁻¹z and U = I − FᵀK⁻¹C, row by row.
-        let entry = |i: usize, j: usize| start + i.max(j) * n_kept + i.min(j);
-        let small = start + n_kept * n_kept;
-        let width = p_trend + 2 + p;
-        let one = self.lower.splat(1.0);
-        let zero = self.lower.splat(0.0);
-        let n_columns = if predicts { width } else { p_trend + 2 };
-        for i in 0..p_trend {
-            for j in 0..n_columns {
-                let mut value = if j < p_trend {
-                    self.lower.at(entry(j, i))
-                } else if j < p_trend + 2 {
-                    self.lower.at(entry(j - p_trend + p, i))
+        let (zero, one) = (self.lower.splat(0.0), self.lower.splat(1.0));
+        for i in 0..self.p_trend {
+            for j in i..places.n_kept {
+                let product = self.lower.at(places.product(j, i));
+                let mut value = if j < data.end {
+                    product
                 } else {
-                    let unit = if j - p_trend - 2 == i { one } else { zero };
-                    unit - self.lower.at(entry(j - p_trend + p, i))
+                    let unit = if j - data.end == i { one } else { zero };
+                    unit - product
                 };
-                if j < i {
-                    continue;
-                }
                 // By columns of R: entry (i, j) is that of Rᵀ for j < p_trend, of R⁻¹(b, U) beyond.
                 for l in 0..i {
-                    value =
-                        value - self.lower.at(small + l * width + i) * self.lower.at(small + l * width + j);
+                    let (of_i, of_j) = (places.small(l, i), places.small(l, j));
+                    value = value - self.lower.at(of_i) * self.lower.at(of_j);
                 }
-                let value = if i == j { value.sqrt() } else { value / self.lower.at(small + i * width + i) };
-                self.lower.set(small + i * width + j, value);
+                let value = if i == j { value.sqrt() } else { value / self.lower.at(places.small(i, i)) };
+                self.lower.set(places.small(i, j), value);
             }
         }
-        // Quadratic forms of heights and entailed heights, with the trend projected out of K⁻¹.
-        for (i, j) in [(0, 0), (1, 0), (1, 1)] {
-            let mut quadratic = self.lower.at(entry(p + i, p + j));
-            for l in 0..p_trend {
-                let row = small + l * width + p_trend;
-                quadratic = quadratic - self.lower.at(row + i) * self.lower.at(row + j);
+    }
+
+    /// Subtracts the trend from the rows of heights and entailed heights, whose coefficients R⁻ᵀR⁻¹b take
+    /// the place of R⁻¹b. Also multiplies the residuals with each other and with C.
+    ///
+    /// A difference of quadratic forms would lose the digits of small residuals.
+    #[inline(always)]
+    fn leave_residuals(&mut self, places: &Places) {
+        let (n, p_trend) = (self.n, self.p_trend);
+        for column in p_trend..p_trend + 2 {
+            for i in (0..p_trend).rev() {
+                let mut value = self.lower.at(places.small(i, column));
+                for m in i + 1..p_trend {
+                    let (entry, found) = (places.small(i, m), places.small(m, column));
+                    value = value - self.lower.at(entry) * self.lower.at(found);
+                }
+                let value = value / self.lower.at(places.small(i, i));
+                self.lower.set(places.small(i, column), value);
             }
-            self.lower.set(entry(p + i, p + j), quadratic);
+            for j in 0..n {
+                let mut value = self.lower.at(self.lower.row(n + column) + j);
+                for i in 0..p_trend {
+                    let trend = self.lower.at(self.lower.row(n + i) + j);
+                    value = value - self.lower.at(places.small(i, column)) * trend;
+                }
+                self.lower.put(n + column, j, value);
+            }
+            for j in p_trend..=column {
+                self.multiply(column, j, places);
+            }
         }
-        if predicts {
-            self.predict(start, n_kept, small, width);
+        for i in p_trend + 2..places.n_kept {
+            for j in p_trend..p_trend + 2 {
+                self.multiply(i, j, places);
+            }
         }
-        self.lanes(start, n_kept, small, width, predicts)
     }
 
     /// Computes means and covariances (over s²) of the derivatives, in place of the products with C.
     #[inline(always)]
-    fn predict(&mut self, start: usize, n_kept: usize, small: usize, width: usize) {
+    fn predict(&mut self, places: &Places) {
         let (p, p_trend) = (self.p, self.p_trend);
+        let first = p_trend + 2;
         let prior = prior_covariance(self.model, self.k);
         for i in 0..p {
-            let row = start + (p + 2 + i) * n_kept;
-            let u_i = small + p_trend + 2 + i;
-            for data in 0..2 {
-                let mut mean = self.lower.at(row + p + data);
-                for l in 0..p_trend {
-                    let b = self.lower.at(small + l * width + p_trend + data);
-                    mean = self.lower.at(u_i + l * width).mul_add(b, mean);
-                }
-                self.lower.set(row + p + data, mean);
+            for column in p_trend..first {
+                let of_trend = self.lower.at(places.small(i, column));
+                let place = places.product(first + i, column);
+                self.lower.set(place, of_trend + self.lower.at(place));
             }
             for j in 0..=i {
-                let u_j = small + p_trend + 2 + j;
-                let mut covariance = prior[i * p + j] - self.lower.at(row + p + 2 + j);
+                let place = places.product(first + i, first + j);
+                let mut covariance = prior[i * p + j] - self.lower.at(place);
                 for l in 0..p_trend {
-                    covariance =
-                        self.lower.at(u_i + l * width).mul_add(self.lower.at(u_j + l * width), covariance);
+                    let (u_i, u_j) = (places.small(l, first + i), places.small(l, first + j));
+                    covariance = self.lower.at(u_i).mul_add(self.lower.at(u_j), covariance);
                 }
-                self.lower.set(row + p + 2 + j, covariance);
+                self.lower.set(place, covariance);
             }
         }
     }
 
     /// Collects the numbers of each lane.
     #[inline(always)]
-    fn lanes(
-        &self,
-        start: usize,
-        n_kept: usize,
-        small: usize,
-        width: usize,
-        predicts: bool,
-    ) -> SmallVec<[Kriged; MAX_LANES]> {
+    fn lanes(&self, places: &Places, predicts: bool) -> SmallVec<[Kriged; MAX_LANES]> {
         let (n, p, p_trend) = (self.n, self.p, self.p_trend);
         let numbers: &[f64] = bytemuck::cast_slice(&*self.lower.registers);
         let lanes = S::F64_LANES;
@@ -111,20 +155,25 @@ impl<S: Simd> Factored<'_, S> {
         for lane in 0..lanes {
             let n_points: f64 = self.batch.is_point[lane..].iter().step_by(lanes).sum();
             let freedom = n_points - p_trend as f64;
-            let form = |i: usize, j: usize| at(start + (p + i) * n_kept + p + j, lane);
+            let form = |i: usize, j: usize| at(places.product(p_trend + i, p_trend + j), lane);
             let log_k = log_sum((0..n).map(|i| at(triangle(i) + i, lane)));
-            let log_r = log_sum((0..p_trend).map(|i| at(small + i * width + i, lane)));
+            let log_r = log_sum((0..p_trend).map(|i| at(places.small(i, i), lane)));
             // An exact plane or sphere leaves no residual, and 0 has no logarithm.
             let heights = form(0, 0).max(freedom * LEAST_HEIGHT * LEAST_HEIGHT);
             let doubt = Doubt::of(heights, form(1, 0), form(1, 1).max(0.0), freedom);
-            let log_likelihood = log_k - log_r - doubt.log_penalty - 0.5 * freedom * doubt.quadratic.ln();
+            let log_likelihood = if freedom < self.model.trend.least_freedom() {
+                f64::NAN
+            } else {
+                log_k - log_r - doubt.log_penalty - 0.5 * freedom * doubt.quadratic.ln()
+            };
             let scale = doubt.quadratic / freedom;
             let mut kriged = Kriged { log_likelihood, scale, freedom, ..Kriged::default() };
             if predicts {
-                let row = |i: usize| start + (p + 2 + i) * n_kept + p;
-                let effect = |i: usize| at(row(i) + 1, lane);
-                let covariance = |i: usize, j: usize| at(row(i.max(j)) + 2 + i.min(j), lane);
-                kriged.means = (0..p).map(|i| at(row(i), lane) - doubt.mean * effect(i)).collect();
+                let first = p_trend + 2;
+                let mean = |i: usize| at(places.product(first + i, p_trend), lane);
+                let effect = |i: usize| at(places.product(first + i, p_trend + 1), lane);
+                let covariance = |i: usize, j: usize| at(places.product(first + i, first + j), lane);
+                kriged.means = (0..p).map(|i| mean(i) - doubt.mean * effect(i)).collect();
                 let entry =
                     |i: usize, j: usize| scale * covariance(i, j) + doubt.variance * effect(i) * effect(j);
                 kriged.covariance = (0..p * p).map(|at| entry(at / p, at % p)).collect();

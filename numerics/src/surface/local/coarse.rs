@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::runs::Runs;
 use crate::error::NumericsError;
 use crate::function::interpolant::Interpolant;
 use crate::kernel::Kernel;
@@ -15,6 +16,13 @@ use crate::solver::{Solver, System};
 use crate::sums::jets::JetOrder;
 use crate::sums::regularization::Regularization;
 
+/// Distance over which gradients of the signature function are continued, in spacings of the coarse cloud.
+/// The kernel bends over three of them.
+const REACH: f64 = 0.3;
+
+/// Points of a run from which continuing is worth while: second derivatives take about twice the time.
+const WORTH_CONTINUING: usize = 3;
+
 /// A thinned cloud with kernel and α. Its signature function tells which side of the full surface is outward.
 pub struct CoarseCloud {
     /// The points, ascending. No two coincide.
@@ -23,6 +31,8 @@ pub struct CoarseCloud {
     /// α: added to the diagonal of the kernel's matrix.
     pub alpha: f64,
     cloud: Cloud,
+    /// Spacing of the coarse cloud, unit L.
+    spacing: f64,
 }
 
 impl CoarseCloud {
@@ -47,11 +57,12 @@ impl CoarseCloud {
         let sampling = Sampling::of(&coarse, observer)?;
         // The closure is called only if the purpose needs the noise.
         let (kernel, alpha) = default_fit(sampling.scales(), Purpose::Normals, || noise)?;
-        Ok(Self { points, kernel, alpha, cloud: coarse })
+        Ok(Self { points, kernel, alpha, cloud: coarse, spacing: sampling.scales().spacing })
     }
 
     /// Computes directions at the points of a cloud, `[n, d]`: minus the gradient of the signature function.
-    /// They point outward on closed clouds.
+    /// They point outward on closed clouds. The points are best in the order of a tree: where many that
+    /// follow each other are near each other, the gradient is continued from the middle of them.
     ///
     /// # Errors
     /// Returns [`NumericsError::Cancelled`] and [`NumericsError::OutOfMemory`]. Other errors of the fit do
@@ -62,7 +73,13 @@ impl CoarseCloud {
         let system = System::new(Arc::new(self.cloud), self.kernel, regularization)?;
         let solver = Arc::new(Solver::dense(system, observer)?);
         let signature = Interpolant::signature(solver, observer)?;
-        let mut directions = signature.at(cloud, JetOrder::Gradient, observer)?.gradients();
+        let runs = Runs::of(cloud, REACH * self.spacing)?;
+        let mut directions = if runs.ranges.len() * WORTH_CONTINUING > cloud.n_points() {
+            signature.at(cloud, JetOrder::Gradient, observer)?.gradients()
+        } else {
+            let jets = signature.at(&runs.middles, JetOrder::Hessian, observer)?;
+            runs.continued(cloud, &jets)
+        };
         directions.iter_mut().for_each(|g| *g = -*g);
         Ok(directions)
     }
@@ -78,4 +95,30 @@ pub(super) fn outward_directions(
     observer: &dyn Observer,
 ) -> Result<Vec<f64>, NumericsError> {
     CoarseCloud::of(cloud, None, noise, observer)?.directions_at(cloud, observer)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observer::Unobserved;
+    use crate::points::cloud::squared_distance;
+    use crate::surface::local::tree_order::TreeOrder;
+    use crate::testing::fibonacci_sphere;
+
+    #[test]
+    fn continued_gradients_point_where_gradients_do() {
+        let cloud = fibonacci_sphere(20_000);
+        let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
+        let ordered = TreeOrder::of(&cloud, sampling).unwrap();
+        let coarse = || CoarseCloud::of(&ordered.cloud, Some(300), 0.0, &Unobserved).unwrap();
+        let runs = Runs::of(&ordered.cloud, REACH * coarse().spacing).unwrap();
+        assert!(runs.ranges.len() * WORTH_CONTINUING < 20_000, "{}", runs.ranges.len());
+        let continued = coarse().directions_at(&ordered.cloud, &Unobserved).unwrap();
+        for (x, direction) in ordered.cloud.points().zip(continued.chunks_exact(3)).step_by(971) {
+            // There is nothing to continue to from a single point.
+            let plain = coarse().directions_at(&Cloud::new(x.to_vec(), 3).unwrap(), &Unobserved).unwrap();
+            let size = squared_distance(&plain, &[0.0; 3]);
+            assert!(squared_distance(direction, &plain) < 1e-3 * size, "{direction:?} and {plain:?}");
+        }
+    }
 }

@@ -1,6 +1,7 @@
 //! The surface made of local regressions, with one side chosen for all of it.
 
 pub mod coarse;
+mod runs;
 pub(crate) mod smoothed;
 pub mod sure;
 mod tree_order;
@@ -148,7 +149,7 @@ impl LocalSurface {
                 let radius = if cloud.radius() > 0.0 { cloud.radius() } else { 1.0 };
                 // Unknown and bent points are not sure either.
                 let ratio = |point| ratio(&at_points, point, d, radius).unwrap_or(0.0);
-                let ratios: Vec<f64> = (0..cloud.n_points()).map(ratio).collect();
+                let ratios: Vec<f64> = (0..cloud.n_points()).into_par_iter().map(ratio).collect();
                 (radius, least_ratio(&ratios))
             }
         };

@@ -5,6 +5,7 @@
 //! sum leaves x out. Far cells of a tree count as one dipole each (Barill, Dickson, Schmidt, Levin and
 //! Jacobson, "Fast winding numbers for soups and clouds", 2018).
 
+use rayon::prelude::*;
 use smallvec::SmallVec;
 
 use crate::machine::small::{Small, zeros};
@@ -13,6 +14,9 @@ use crate::points::cloud::{Cloud, squared_distance};
 
 /// Points per leaf, whose terms are summed one by one.
 const LEAF_SIZE: usize = 16;
+
+/// Points of the half of a cell from which both halves are split at the same time.
+const TOGETHER: usize = 4096;
 
 /// Radii of a cell beyond which it counts as one dipole: β of the paper.
 const OPENING: f64 = 2.0;
@@ -38,7 +42,7 @@ pub(crate) struct Dipoles {
 struct Cell {
     start: usize,
     end: usize,
-    /// Index of the second child. The first child follows its parent. `None` for a leaf.
+    /// Cells from this one to the second child. The first child follows its parent. `None` for a leaf.
     right: Option<usize>,
     /// Mean position, weighted by area.
     centre: Small,
@@ -71,7 +75,7 @@ impl Dipoles {
     pub(crate) fn soften(&mut self, softening: f64) {
         let d = self.dimension;
         let squared = |m: &[f64]| (softening * norm(m).powf(1.0 / (d - 1) as f64)).powi(2);
-        self.softenings = self.moments.chunks_exact(d).map(squared).collect();
+        self.softenings = self.moments.par_chunks_exact(d).map(squared).collect();
     }
 
     /// Returns w(x), leaving out points at x itself.
@@ -103,7 +107,7 @@ impl Dipoles {
             let is_far = squared > OPENING * OPENING * cell.squared_radius;
             match cell.right.filter(|_| !is_far) {
                 Some(right) => {
-                    pending.push(right);
+                    pending.push(at + right);
                     at += 1;
                     continue;
                 }
@@ -214,9 +218,20 @@ impl Builder<'_> {
         let middle = order.len() / 2;
         order.select_nth_unstable_by(middle, |&a, &b| at(a).total_cmp(&at(b)).then(a.cmp(&b)));
         let (left, right) = order.split_at_mut(middle);
-        self.split(cells, left, start);
-        cells[this].right = Some(cells.len());
-        self.split(cells, right, start + middle);
+        if left.len() < TOGETHER {
+            self.split(cells, left, start);
+            cells[this].right = Some(cells.len() - this);
+            self.split(cells, right, start + middle);
+            return;
+        }
+        let (mut of_left, mut of_right) = (Vec::new(), Vec::new());
+        rayon::join(
+            || self.split(&mut of_left, left, start),
+            || self.split(&mut of_right, right, start + middle),
+        );
+        cells[this].right = Some(1 + of_left.len());
+        cells.append(&mut of_left);
+        cells.append(&mut of_right);
     }
 
     fn cell(&self, order: &[u32], start: usize) -> Cell {

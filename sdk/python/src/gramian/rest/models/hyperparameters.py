@@ -31,6 +31,9 @@ class Hyperparameters:
             variance (float): Variance of these heights, length squared.
             radius (float): Half the diagonal of the bounding box of the cloud, length. Beside it, small curvatures count as
                 0.
+            quartic_noise_ratios (list[NoiseRatio] | Unset): Mixture of noise ratios beside polynomials of fourth order.
+                Empty where points have noise, or quadrics
+                are as sure.
             least_ratio (float | Unset): Least ratio of a curvature to its deviation at which the curvature counts as known.
                 Absent if none
                 is known.
@@ -43,6 +46,7 @@ class Hyperparameters:
     length_scale: float
     variance: float
     radius: float
+    quartic_noise_ratios: list[NoiseRatio] | Unset = UNSET
     least_ratio: float | Unset = UNSET
 
     __repr__ = without_unset
@@ -68,6 +72,13 @@ class Hyperparameters:
 
         radius = self.radius
 
+        quartic_noise_ratios: list[dict[str, Any]] | Unset = UNSET
+        if not isinstance(self.quartic_noise_ratios, Unset):
+            quartic_noise_ratios = []
+            for quartic_noise_ratios_item_data in self.quartic_noise_ratios:
+                quartic_noise_ratios_item = quartic_noise_ratios_item_data.to_dict()
+                quartic_noise_ratios.append(quartic_noise_ratios_item)
+
         least_ratio = self.least_ratio
 
         field_dict: dict[str, Any] = {}
@@ -83,6 +94,8 @@ class Hyperparameters:
                 "radius": radius,
             }
         )
+        if quartic_noise_ratios is not UNSET:
+            field_dict["quartic_noise_ratios"] = quartic_noise_ratios
         if least_ratio is not UNSET:
             field_dict["least_ratio"] = least_ratio
 
@@ -117,6 +130,15 @@ class Hyperparameters:
 
         radius = d.pop("radius")
 
+        _quartic_noise_ratios = d.pop("quartic_noise_ratios", UNSET)
+        quartic_noise_ratios: list[NoiseRatio] | Unset = UNSET
+        if _quartic_noise_ratios is not UNSET:
+            quartic_noise_ratios = []
+            for quartic_noise_ratios_item_data in _quartic_noise_ratios:
+                quartic_noise_ratios_item = NoiseRatio.from_dict(quartic_noise_ratios_item_data)
+
+                quartic_noise_ratios.append(quartic_noise_ratios_item)
+
         least_ratio = d.pop("least_ratio", UNSET)
 
         hyperparameters = cls(
@@ -127,6 +149,7 @@ class Hyperparameters:
             length_scale=length_scale,
             variance=variance,
             radius=radius,
+            quartic_noise_ratios=quartic_noise_ratios,
             least_ratio=least_ratio,
         )
 
