@@ -1,5 +1,6 @@
 """Rows of the solver `landmark`: one function through all points, beside the dense solver where that runs."""
 
+import functools
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -95,17 +96,20 @@ class Landmarks:
         request = {"kernel": GAUSS, "alpha": ALPHA, "include": ["variance"], "solver": "landmark"}
 
         def ours() -> Entry:
-            few = self.setting.size(4_000, 1_000)
-            found, dense = (self._posterior(few, 1_000, {**request, "solver": s}) for s in ("landmark", "dense"))
+            checked = [self.setting.size(size, 1_000) for size in (4_000, 20_000)]
+            worst = functools.reduce(larger, (self._beside_dense(size, request) for size in checked))
             work = self._posterior(n, m, request)
             misses = work.arrays["means"].ravel() - wave(queries(m))
             error = {"rms error": Figure(float(np.sqrt(np.mean(misses**2))))}
-            return entry(
-                OURS, work, {**off(found, dense), **error, **said(work)}, f"the first two at n = {few:,}; {notes_of(work)}"
-            )
+            sizes = " and ".join(f"{size:,}" for size in checked)
+            return entry(OURS, work, {**worst, **error, **said(work)}, f"the first two at n = {sizes}; {notes_of(work)}")
 
         what = f"posterior mean and variance, Gauss ℓ = 1, α = 1e-4, torus, n = {n:,}, m = {m:,}"
         return Work(what, (*costs(45, 1.5), *accurate(1e-6, 1e-6)), {}, ours, nobody)
+
+    def _beside_dense(self, n: int, request: Mapping[str, Any]) -> dict[str, Figure]:
+        found, dense = (self._posterior(n, 1_000, {**request, "solver": s}) for s in ("landmark", "dense"))
+        return off(found, dense)
 
     def _posterior(self, n: int, m: int, request: Mapping[str, Any], n_rounds: int = 1) -> Answered:
         points = torus(n).points
@@ -114,6 +118,11 @@ class Landmarks:
     def _values(self, n: int, request: Mapping[str, Any]) -> Answered:
         points, m = torus(n).points, self.setting.size(10_000, 500)
         return self.service.ask("/v1/interpolation", points, request, {"values": noisy(points), "queries": queries(m)})
+
+
+def larger(some: Mapping[str, Figure], others: Mapping[str, Figure]) -> dict[str, Figure]:
+    """The larger of each two figures."""
+    return {name: max(some[name], others[name], key=lambda figure: figure.value) for name in some}
 
 
 def nobody() -> Iterable[Entry]:
