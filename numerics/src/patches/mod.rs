@@ -1,14 +1,16 @@
 //! Local regression: the surface around each query as a height over its tangent plane, kriged from the
 //! nearest points.
 //!
-//! The height is the sum of a quadric, the entailed height that its curvature implies beyond second order, a
-//! Gaussian process and noise (`regression`). Hyperparameters come from the likelihood pooled over a sample
-//! of neighbourhoods (`pooled`). The size of the neighbourhoods is chosen along with them and grows with the
-//! noise (`means`). The posterior gives normal and curvatures with their deviations (`estimate`). Everything
-//! is local: work and memory are linear in points and queries.
+//! The height is the sum of a quadric (where points are exact, a polynomial of fourth order), the entailed
+//! height that its curvature implies beyond second order, a Gaussian process and noise (`regression`).
+//! Hyperparameters come from the likelihood pooled over a sample of neighbourhoods (`pooled`). The size of
+//! the neighbourhoods and the order of the trend are chosen along with them (`learning`). Neighbourhoods grow
+//! with the noise (`means`). The posterior gives normal and curvatures with their deviations (`estimate`).
+//! Everything is local: work and memory are linear in points and queries.
 
 mod answers;
 mod estimate;
+mod learning;
 mod means;
 mod neighbourhood;
 mod pooled;
@@ -22,43 +24,17 @@ use super::error::NumericsError;
 use super::machine::heap::vec_bytes;
 use super::observer::Observer;
 use super::points::cloud::Cloud;
-use super::points::sampling::{Sampling, median};
+use super::points::sampling::Sampling;
+pub use learning::MAX_SITES;
 use means::Support;
 use neighbourhood::n_neighbours;
 pub use pooled::MAX_MODELS;
-use pooled::{Kind, Weighted, pool, responsibilities};
-use regression::{Model, n_terms};
-use room::{Found, Purpose};
+use pooled::{Kind, Weighted};
 
 pub use answers::{CurvatureDeviations, PatchGeometry};
 
-/// Number of neighbourhoods whose likelihood is pooled, or fewer than twice as many.
-const N_SITES: usize = 96;
-
 /// The greatest dimension of local regressions. Beyond it neighbourhoods say too little.
 pub const MAX_LOCAL_DIMENSION: usize = 4;
-
-/// Greatest number of sites that a caller of [`Patches::learned_at`] may choose.
-pub const MAX_SITES: usize = 2 * N_SITES;
-
-/// Points per mean, tried in this order.
-const GROUPS: [usize; 7] = [1, 3, 8, 24, 72, 216, 648];
-
-/// Least number of means that a group size must leave of a cloud to be tried.
-const LEAST_MEANS: usize = 60;
-
-/// Fraction to which deviations must fall for the next larger group size to be accepted, in the median over
-/// the sites. Each site is compared with itself: deviations of a scan differ between sites by far more.
-const WORTH: f64 = 0.95;
-
-/// The same for means of three instead of points. Where there is hardly anything but noise, deviations fall
-/// to a fifth, and in a lens that is thinner than its points are apart to two thirds. A scan thinned to a
-/// twentieth, whose shape its points just resolve, lost half of the accuracy of its curvatures to means that
-/// promised deviations of three quarters.
-const WORTH_OF_MEANS: f64 = 0.7;
-
-/// The same for a trend of fourth order instead of a quadric, where points are exact.
-const WORTH_OF_QUARTIC: f64 = 0.7;
 
 /// A ratio of the variance of the noise to that of the heights, and how common it is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -111,77 +87,6 @@ pub struct PatchKernel {
 }
 
 impl Patches {
-    /// Chooses group size and hyperparameters by a sample of the points that covers all spacings.
-    ///
-    /// # Errors
-    /// [`NumericsError::DimensionTooSmall`] for d = 1, [`NumericsError::Cancelled`].
-    pub fn of(
-        cloud: Arc<Cloud>,
-        sampling: Arc<Sampling>,
-        observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
-        let sites = cloud.select(&sampling.of_every_spacing(N_SITES));
-        Self::learned_at(&sites, cloud, sampling, observer)
-    }
-
-    /// Chooses group size and hyperparameters by the neighbourhoods of sites `[s, d]`. Parts of a cloud that
-    /// hold the same neighbourhoods of the same sites learn the same.
-    ///
-    /// # Errors
-    /// [`NumericsError::DimensionTooSmall`] for d = 1, [`NumericsError::Cancelled`].
-    pub fn learned_at(
-        sites: &Cloud,
-        cloud: Arc<Cloud>,
-        sampling: Arc<Sampling>,
-        observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
-        check_dimension(cloud.dimension())?;
-        let mut best: Option<(Self, Vec<f64>)> = None;
-        for group in GROUPS {
-            if group > 1 && cloud.n_points() / group < LEAST_MEANS {
-                break;
-            }
-            let support = Support::of(group, cloud.clone(), sampling.clone(), observer)?;
-            let patches = Self::over(sites, support, observer)?;
-            let deviations = patches.deviations(sites, observer)?;
-            let is_exact = patches.noise == 0.0;
-            let worth = if best.as_ref().is_some_and(|(best, _)| best.points_per_mean() == 1) {
-                WORTH_OF_MEANS
-            } else {
-                WORTH
-            };
-            let is_better = best.as_ref().is_none_or(|(_, least)| ratio(&deviations, least) < worth);
-            if is_better {
-                best = Some((patches, deviations));
-            }
-            if !is_better || is_exact {
-                break;
-            }
-        }
-        let (best, deviations) = best.ok_or(NumericsError::EmptyCloud)?;
-        best.with_quartic(&deviations, sites, observer)
-    }
-
-    /// Takes a trend of fourth order if points are exact and the largest deviations of curvatures at the
-    /// sites fall enough, from these.
-    fn with_quartic(
-        mut self,
-        deviations: &[f64],
-        sites: &Cloud,
-        observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
-        if self.noise > 0.0 || self.points_per_mean() > 1 || self.models.is_empty() {
-            return Ok(self);
-        }
-        self.quartic = self.pooled(Kind::Quartic, sites, observer)?;
-        if ratio(&self.deviations(sites, observer)?, deviations) < WORTH_OF_QUARTIC {
-            self.kernel = self.scales(&self.quartic, sites, observer)?.kernel;
-        } else {
-            self.quartic.clear();
-        }
-        Ok(self)
-    }
-
     /// Regresses with hyperparameters that were learned before, of this cloud or of one that it is part of.
     ///
     /// # Errors
@@ -222,75 +127,6 @@ impl Patches {
         }
     }
 
-    /// Learns the hyperparameters on one support.
-    fn over(sites: &Cloud, support: Support, observer: &dyn Observer) -> Result<Self, NumericsError> {
-        let d = sites.dimension();
-        let count = n_neighbours(d, support.cloud().n_points());
-        let mut patches = Self {
-            support,
-            models: Vec::new(),
-            stiff: Vec::new(),
-            quartic: Vec::new(),
-            count,
-            noise: 0.0,
-            kernel: PatchKernel::default(),
-        };
-        if count < n_terms(d) + 2 {
-            return Ok(patches);
-        }
-        patches.models = patches.pooled(Kind::Plain, sites, observer)?;
-        Scales { noise: patches.noise, kernel: patches.kernel } =
-            patches.scales(&patches.models, sites, observer)?;
-        if patches.noise > 0.0 {
-            patches.stiff = patches.pooled(Kind::Stiff, sites, observer)?;
-        }
-        Ok(patches)
-    }
-
-    /// Returns the mixture of models of one kind that makes the neighbourhoods of these queries most likely.
-    fn pooled(
-        &self,
-        kind: Kind,
-        queries: &Cloud,
-        observer: &dyn Observer,
-    ) -> Result<Vec<Weighted>, NumericsError> {
-        let candidates = kind.candidates();
-        let found = self.krige_each(queries, &candidates, Purpose::Likelihood, observer)?;
-        let logs = |(_, kriged): &Found| kriged.iter().map(|k| k.log_likelihood).collect();
-        Ok(pool(kind, &candidates, &found.iter().flatten().map(logs).collect::<Vec<Vec<f64>>>()))
-    }
-
-    /// Returns the largest deviation of a principal curvature at each site, 1/L, infinite where there is
-    /// none.
-    fn deviations(&self, sites: &Cloud, observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
-        let PatchGeometry { is_known, curvatures, .. } = self.at(sites, true, true, observer)?;
-        let of_curvatures = curvatures.unwrap_or_default().principal;
-        let rows = is_known.iter().zip(of_curvatures.chunks_exact(sites.dimension() - 1));
-        let largest = |row: &[f64]| row.iter().copied().fold(0.0, f64::max);
-        Ok(rows.map(|(is_known, row)| if *is_known { largest(row) } else { f64::INFINITY }).collect())
-    }
-
-    /// Returns noise and kernel of the heights by these models: medians over the sites.
-    fn scales(
-        &self,
-        models: &[Weighted],
-        sites: &Cloud,
-        observer: &dyn Observer,
-    ) -> Result<Scales, NumericsError> {
-        let candidates: Vec<Model> = models.iter().map(|weighted| weighted.model).collect();
-        let found = self.krige_each(sites, &candidates, Purpose::Likelihood, observer)?;
-        let at_sites: Vec<[f64; 3]> =
-            found.iter().flatten().filter_map(|found| scales(models, found)).collect();
-        let middle = |at: usize| median(at_sites.iter().map(|scales| scales[at]).collect());
-        Ok(Scales {
-            noise: middle(0).unwrap_or(0.0).sqrt(),
-            kernel: PatchKernel {
-                length_scale: middle(1).unwrap_or(1.0),
-                variance: middle(2).unwrap_or(1.0),
-            },
-        })
-    }
-
     /// Returns the most points of which regressions see the mean, 1 where they see the points themselves.
     pub fn points_per_mean(&self) -> usize {
         self.support.points_per_mean()
@@ -311,38 +147,6 @@ impl Patches {
         self.support.n_bytes()
             + [&self.models, &self.stiff, &self.quartic].map(vec_bytes).iter().sum::<usize>()
     }
-}
-
-/// Noise of the points across the surface, and kernel of the heights.
-struct Scales {
-    /// Standard deviation, unit L.
-    noise: f64,
-    kernel: PatchKernel,
-}
-
-/// Returns the variance of the noise (L²), ℓ (L) and s² (L²) of one neighbourhood, `None` where no model has
-/// an answer.
-fn scales(models: &[Weighted], (place, kriged): &Found) -> Option<[f64; 3]> {
-    let shares = responsibilities(models, kriged);
-    if shares.iter().all(|share| *share == 0.0) {
-        return None;
-    }
-    let (mut noise, mut length_scale, mut variance) = (0.0, 0.0, 0.0);
-    for ((share, kriged), Weighted { model, .. }) in shares.iter().zip(kriged).zip(models) {
-        if *share > 0.0 {
-            length_scale += share * model.length_scale * place.radius;
-            variance += share * kriged.scale * place.radius.powi(2);
-            // Ratios up to 1e-7 are rounding and count as no noise.
-            noise += share * if model.noise > 1e-7 { kriged.scale * model.noise } else { 0.0 };
-        }
-    }
-    Some([noise * place.radius.powi(2), length_scale, variance])
-}
-
-/// Median ratio of deviations at the same sites, infinite where none is finite.
-fn ratio(deviations: &[f64], others: &[f64]) -> f64 {
-    let ratios = deviations.iter().zip(others).map(|(a, b)| a / b);
-    median(ratios.filter(|ratio| !ratio.is_nan()).collect()).unwrap_or(f64::INFINITY)
 }
 
 /// Returns the most points, or means, that a regression sees.

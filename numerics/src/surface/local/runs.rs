@@ -35,7 +35,8 @@ impl Runs {
         Ok(Self { ranges, middles: Cloud::new(middles, cloud.dimension())? })
     }
 
-    /// Gradients at the points of the cloud, `[n, d]`, from derivatives at the middles: `∇u(c) + D²u(c)(x − c)`.
+    /// Gradients at the points of the cloud, `[n, d]`, from derivatives at the middles:
+    /// `∇u(c) + D²u(c)(x − c)`.
     pub(super) fn continued(&self, cloud: &Cloud, at_middles: &Jets) -> Vec<f64> {
         let d = cloud.dimension();
         let mut gradients = Vec::with_capacity(cloud.n_points() * d);
