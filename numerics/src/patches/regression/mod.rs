@@ -44,7 +44,7 @@ pub(crate) const fn n_terms(dimension: usize) -> usize {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Kriged {
     /// Logarithm of the restricted likelihood, with s² integrated out under the prior 1/s², up to a constant
-    /// of the patch. NaN where K is not positive definite in float64, or points are too few for the trend.
+    /// of the patch. NaN where K is not positive definite in float64, or points do not determine the trend.
     pub log_likelihood: f64,
     /// Scale s², estimated as `q/(n − p)`.
     pub scale: f64,

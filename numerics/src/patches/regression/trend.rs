@@ -161,10 +161,13 @@ impl<S: Simd> Factored<'_, S> {
             // An exact plane or sphere leaves no residual, and 0 has no logarithm.
             let heights = form(0, 0).max(freedom * LEAST_HEIGHT * LEAST_HEIGHT);
             let doubt = Doubt::of(heights, form(1, 0), form(1, 1).max(0.0), freedom);
-            let log_likelihood = if freedom < self.model.trend.least_freedom() {
-                f64::NAN
-            } else {
+            let independence =
+                |i: usize| at(places.small(i, i), lane).powi(2) / at(places.product(i, i), lane);
+            let independence = (0..p_trend).map(independence).fold(1.0, f64::min);
+            let log_likelihood = if self.model.trend.is_determined(freedom, independence) {
                 log_k - log_r - doubt.log_penalty - 0.5 * freedom * doubt.quadratic.ln()
+            } else {
+                f64::NAN
             };
             let scale = doubt.quadratic / freedom;
             let mut kriged = Kriged { log_likelihood, scale, freedom, ..Kriged::default() };

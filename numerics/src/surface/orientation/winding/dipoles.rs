@@ -34,21 +34,36 @@ pub(crate) struct Dipoles {
     moments: Vec<f64>,
     /// Squared softening lengths, which are added to squared distances, `[m]`.
     softenings: Vec<f64>,
-    cells: Vec<Cell>,
+    tree: Tree,
     inverse_sphere: f64,
 }
 
-/// A range of points with the sum of their moments.
+/// Cells, the first child after its parent.
+#[derive(Default)]
+struct Tree {
+    cells: Vec<Cell>,
+    /// Mean positions, weighted by area, `[c, d]`.
+    centres: Vec<f64>,
+    /// Sums of the moments, `[c, d]`.
+    moments: Vec<f64>,
+}
+
+/// A range of points.
 struct Cell {
-    start: usize,
-    end: usize,
-    /// Cells from this one to the second child. The first child follows its parent. `None` for a leaf.
-    right: Option<usize>,
-    /// Mean position, weighted by area.
-    centre: Small,
-    moment: Small,
+    start: u32,
+    end: u32,
+    /// Cells from this one to the second child, 0 for a leaf.
+    right: u32,
     /// Greatest distance of a point from the centre, squared.
     squared_radius: f64,
+}
+
+impl Tree {
+    fn append(&mut self, mut other: Self) {
+        self.cells.append(&mut other.cells);
+        self.centres.append(&mut other.centres);
+        self.moments.append(&mut other.moments);
+    }
 }
 
 impl Dipoles {
@@ -57,16 +72,16 @@ impl Dipoles {
     pub(crate) fn of(cloud: &Cloud, moments: &[f64], points: &[usize]) -> Self {
         let d = cloud.dimension();
         let mut order: Vec<u32> = points.iter().map(|&point| point as u32).collect();
-        let mut cells = Vec::new();
+        let mut tree = Tree::default();
         let builder = Builder { cloud, moments };
-        builder.split(&mut cells, &mut order, 0);
+        builder.split(&mut tree, &mut order, 0);
         let rows = |of: &[f64]| -> Vec<f64> {
             order.iter().flat_map(|&point| of[point as usize * d..][..d].iter().copied()).collect()
         };
         let (positions, moments) = (rows(cloud.coordinates()), rows(moments));
         let inverse_sphere = 1.0 / (d as f64 * ball_volume(d));
         let mut dipoles =
-            Self { dimension: d, positions, moments, softenings: Vec::new(), cells, inverse_sphere };
+            Self { dimension: d, positions, moments, softenings: Vec::new(), tree, inverse_sphere };
         dipoles.soften(SOFTENING);
         dipoles
     }
@@ -99,28 +114,27 @@ impl Dipoles {
     /// Calls `take` with the moment, the position and the squared softening of each term of w(x).
     #[inline(always)]
     fn for_each_term(&self, x: &[f64], mut take: impl FnMut(&[f64], &[f64], f64)) {
+        let (d, tree) = (self.dimension, &self.tree);
         let mut at = 0;
         let mut pending: SmallVec<[usize; 32]> = SmallVec::new();
         loop {
-            let Some(cell) = self.cells.get(at) else { return };
-            let squared = squared_distance(&cell.centre, x);
-            let is_far = squared > OPENING * OPENING * cell.squared_radius;
-            match cell.right.filter(|_| !is_far) {
-                Some(right) => {
-                    pending.push(at + right);
-                    at += 1;
-                    continue;
-                }
-                None if is_far => take(&cell.moment, &cell.centre, 0.0),
-                None => {
-                    let d = self.dimension;
-                    let range = cell.start * d..cell.end * d;
-                    let (positions, moments) = (&self.positions[range.clone()], &self.moments[range]);
-                    let terms = moments.chunks_exact(d).zip(positions.chunks_exact(d));
-                    terms
-                        .zip(&self.softenings[cell.start..cell.end])
-                        .for_each(|((moment, y), softening)| take(moment, y, *softening));
-                }
+            let Some(cell) = tree.cells.get(at) else { return };
+            let centre = &tree.centres[at * d..][..d];
+            let is_far = squared_distance(centre, x) > OPENING * OPENING * cell.squared_radius;
+            if is_far {
+                take(&tree.moments[at * d..][..d], centre, 0.0);
+            } else if cell.right > 0 {
+                pending.push(at + cell.right as usize);
+                at += 1;
+                continue;
+            } else {
+                let (start, end) = (cell.start as usize, cell.end as usize);
+                let (positions, moments) =
+                    (&self.positions[start * d..end * d], &self.moments[start * d..end * d]);
+                let terms = moments.chunks_exact(d).zip(positions.chunks_exact(d));
+                terms
+                    .zip(&self.softenings[start..end])
+                    .for_each(|((moment, y), softening)| take(moment, y, *softening));
             }
             match pending.pop() {
                 Some(next) => at = next,
@@ -207,10 +221,10 @@ struct Builder<'a> {
 impl Builder<'_> {
     /// Appends the cells of these points, in halves across the widest side. `start` is the number of points
     /// before them.
-    fn split(&self, cells: &mut Vec<Cell>, order: &mut [u32], start: usize) {
-        let this = cells.len();
-        cells.push(self.cell(order, start));
-        if order.len() <= LEAF_SIZE || cells[this].squared_radius == 0.0 {
+    fn split(&self, tree: &mut Tree, order: &mut [u32], start: usize) {
+        let this = tree.cells.len();
+        self.push_cell(tree, order, start);
+        if order.len() <= LEAF_SIZE || tree.cells[this].squared_radius == 0.0 {
             return;
         }
         let axis = widest_axis(self.cloud, order);
@@ -219,22 +233,22 @@ impl Builder<'_> {
         order.select_nth_unstable_by(middle, |&a, &b| at(a).total_cmp(&at(b)).then(a.cmp(&b)));
         let (left, right) = order.split_at_mut(middle);
         if left.len() < TOGETHER {
-            self.split(cells, left, start);
-            cells[this].right = Some(cells.len() - this);
-            self.split(cells, right, start + middle);
+            self.split(tree, left, start);
+            tree.cells[this].right = (tree.cells.len() - this) as u32;
+            self.split(tree, right, start + middle);
             return;
         }
-        let (mut of_left, mut of_right) = (Vec::new(), Vec::new());
+        let (mut of_left, mut of_right) = (Tree::default(), Tree::default());
         rayon::join(
             || self.split(&mut of_left, left, start),
             || self.split(&mut of_right, right, start + middle),
         );
-        cells[this].right = Some(1 + of_left.len());
-        cells.append(&mut of_left);
-        cells.append(&mut of_right);
+        tree.cells[this].right = 1 + of_left.cells.len() as u32;
+        tree.append(of_left);
+        tree.append(of_right);
     }
 
-    fn cell(&self, order: &[u32], start: usize) -> Cell {
+    fn push_cell(&self, tree: &mut Tree, order: &[u32], start: usize) {
         let d = self.cloud.dimension();
         let (mut centre, mut moment, mut total) = (zeros(d), zeros(d), 0.0);
         for &point in order {
@@ -251,7 +265,10 @@ impl Builder<'_> {
         }
         let squared = |&point: &u32| squared_distance(&centre, self.cloud.point(point as usize));
         let squared_radius = order.iter().map(squared).fold(0.0, f64::max);
-        Cell { start, end: start + order.len(), right: None, centre, moment, squared_radius }
+        let (start, end) = (start as u32, (start + order.len()) as u32);
+        tree.cells.push(Cell { start, end, right: 0, squared_radius });
+        tree.centres.extend(centre);
+        tree.moments.extend(moment);
     }
 }
 
