@@ -13,9 +13,9 @@ pub(super) fn tree(cloud: &Cloud, observer: &dyn Observer) -> Result<Neighbours>
     let cloud = cloud_on_grid(cloud)?;
     let cloud = cloud.as_ref();
     let mut order: Vec<u32> = (0..cloud.n_points() as u32).collect();
-    let mut builder = Builder { cloud, observer, nodes: Vec::new(), starts: Vec::new() };
-    builder.split(&mut order, 0)?;
-    let Builder { nodes, mut starts, .. } = builder;
+    let mut tree = Part::default();
+    Builder { cloud, observer }.split(&mut tree, &mut order, 0)?;
+    let Part { nodes, mut starts } = tree;
     // Allocated at its final size: a growing list takes up to three times as much.
     let mut coordinates = Vec::with_capacity(starts.len() * cloud.dimension());
     for &start in &starts {
@@ -37,12 +37,35 @@ fn cloud_on_grid(cloud: &Cloud) -> Result<Cow<'_, Cloud>> {
     Cloud::new(coordinates, cloud.dimension()).map(Cow::Owned)
 }
 
+/// Points of the smaller half from which both halves are split at the same time.
+const TOGETHER: usize = 4096;
+
 struct Builder<'a> {
     cloud: &'a Cloud,
     observer: &'a dyn Observer,
+}
+
+/// A part of a tree.
+#[derive(Default)]
+struct Part {
     nodes: Vec<Node>,
     /// First point of each position, as an index into the order of the points, leaf by leaf.
     starts: Vec<u32>,
+}
+
+impl Part {
+    /// Appends a part whose nodes and positions were counted from 0.
+    fn append(&mut self, other: &mut Self) {
+        let (n_nodes, n_positions) = (self.nodes.len() as u32, self.starts.len() as u32);
+        for node in &mut other.nodes {
+            match node {
+                Node::Leaf { start, end } => (*start, *end) = (*start + n_positions, *end + n_positions),
+                Node::Split { right, .. } => *right += n_nodes,
+            }
+        }
+        self.nodes.append(&mut other.nodes);
+        self.starts.append(&mut other.starts);
+    }
 }
 
 /// The axis with the greatest extent of some points. Ties go to the first axis.
@@ -53,23 +76,35 @@ struct Widest {
 
 impl Builder<'_> {
     /// Appends the nodes of these points. `start` points come before them.
-    fn split(&mut self, order: &mut [u32], start: usize) -> Result<()> {
+    fn split(&self, tree: &mut Part, order: &mut [u32], start: usize) -> Result<()> {
         self.observer.checkpoint()?;
         let Widest { axis, extent } = self.widest(order);
         if order.len() <= LEAF_SIZE || extent == 0.0 {
-            self.push_leaf(order, start);
+            self.push_leaf(tree, order, start);
             return Ok(());
         }
         let n_left = self.partition(order, axis);
-        let this = self.nodes.len();
+        let this = tree.nodes.len();
         let (left, right) = order.split_at_mut(n_left);
         let below = left.iter().map(|&point| self.at(point, axis)).fold(f64::NEG_INFINITY, f64::max);
         let above = right.iter().map(|&point| self.at(point, axis)).fold(f64::INFINITY, f64::min);
         let node = |right: usize| Node::Split { axis: axis as u32, right: right as u32, below, above };
-        self.nodes.push(node(0));
-        self.split(left, start)?;
-        self.nodes[this] = node(self.nodes.len());
-        self.split(right, start + n_left)
+        tree.nodes.push(node(0));
+        if left.len().min(right.len()) < TOGETHER {
+            self.split(tree, left, start)?;
+            tree.nodes[this] = node(tree.nodes.len());
+            return self.split(tree, right, start + n_left);
+        }
+        let (mut of_left, mut of_right) = (Part::default(), Part::default());
+        let (on_left, on_right) = rayon::join(
+            || self.split(&mut of_left, left, start),
+            || self.split(&mut of_right, right, start + n_left),
+        );
+        on_left.and(on_right)?;
+        tree.append(&mut of_left);
+        tree.nodes[this] = node(tree.nodes.len());
+        tree.append(&mut of_right);
+        Ok(())
     }
 
     /// Partitions points along an axis into two non-empty parts that share no coordinate, and returns the
@@ -91,20 +126,20 @@ impl Builder<'_> {
     }
 
     /// Appends a leaf. Its points are ordered by position, then by index.
-    fn push_leaf(&mut self, order: &mut [u32], start: usize) {
+    fn push_leaf(&self, tree: &mut Part, order: &mut [u32], start: usize) {
         let position = |point: u32| self.cloud.point(point as usize);
         order.sort_unstable_by(|&a, &b| {
             // Coordinates are never NaN, so there always is an order.
             let by_position = position(a).partial_cmp(position(b)).unwrap_or(Ordering::Equal);
             by_position.then(a.cmp(&b))
         });
-        let first = self.starts.len() as u32;
+        let first = tree.starts.len() as u32;
         let mut at = start;
         for points in order.chunk_by(|&a, &b| position(a) == position(b)) {
-            self.starts.push(at as u32);
+            tree.starts.push(at as u32);
             at += points.len();
         }
-        self.nodes.push(Node::Leaf { start: first, end: self.starts.len() as u32 });
+        tree.nodes.push(Node::Leaf { start: first, end: tree.starts.len() as u32 });
     }
 
     fn at(&self, point: u32, axis: usize) -> f64 {

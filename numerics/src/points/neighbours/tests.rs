@@ -1,6 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::machine::random::Random;
 use crate::observer::Unobserved;
 use crate::points::cloud::squared_distance;
 
@@ -64,6 +65,20 @@ proptest! {
             walk.points_into(x, count, &mut found);
             prop_assert_eq!(&found, &brute_force(&cloud, x, count));
         }
+    }
+}
+
+#[test]
+fn halves_that_are_split_at_the_same_time_make_one_tree() {
+    // Large enough for three levels of them, with copies.
+    let mut raw = vec![0.0; 3 * 30_000];
+    Random::of(7, 0).fill_normal(&mut raw);
+    raw.extend_from_within(..3000);
+    let cloud = Cloud::new(raw, 3).unwrap();
+    let tree = tree_of(&cloud);
+    assert_eq!(tree.n_positions(), 30_000);
+    for x in cloud.points().step_by(1571) {
+        assert_eq!(tree.nearest(x, 8), brute_force(&cloud, x, 8));
     }
 }
 
