@@ -35,7 +35,8 @@ const WORTH: f64 = 0.95;
 /// promised deviations of three quarters.
 const WORTH_OF_MEANS: f64 = 0.7;
 
-/// The same for a trend of fourth order instead of a quadric, where points are exact.
+/// The same for a trend of fourth order instead of a quadric, where points are exact. Where points just
+/// resolve a surface, both are as sure, and the quadric leaves more degrees of freedom to tell how sure.
 const WORTH_OF_QUARTIC: f64 = 0.7;
 
 impl Patches {
