@@ -110,6 +110,7 @@ async fn keep_weights(store: &Factors, k: usize) {
         misfit: 0.0,
         refined: false,
         n_iterations: None,
+        product: Vec::new(),
         energy: 0.0,
         trend: None,
         outlier: None,

@@ -19,6 +19,9 @@ use super::Owner;
 /// Measured by tests/footprint.rs.
 const ENTRY_BYTES: usize = 64;
 
+/// Entries among which [`FairCache::latest`] looks.
+const LOOKED_AT: usize = 256;
+
 /// A byte-bounded cache. Values are handles that are cheap to clone.
 pub(super) struct FairCache<K, V> {
     max_bytes: usize,
@@ -151,6 +154,14 @@ impl<K: Hash + Eq, V: Clone> FairCache<K, V> {
         of_owner.into_iter().flat_map(|of| of.by_use.iter()).map(|(_, entry)| entry.value.clone()).collect()
     }
 
+    /// Returns up to `count` values whose key satisfies `is_meant`, the latest used first. It looks at the
+    /// latest used entries of the owner alone, so that the lock is held for a moment.
+    pub(super) fn latest(&self, owner: Owner, count: usize, is_meant: impl Fn(&K) -> bool) -> Vec<V> {
+        let entries = self.lock();
+        let latest = entries.of.get(&owner).into_iter().flat_map(|of| of.by_use.iter()).take(LOOKED_AT);
+        latest.filter(|(key, _)| is_meant(key)).take(count).map(|(_, entry)| entry.value.clone()).collect()
+    }
+
     /// Bytes of all values in the cache.
     pub(super) fn n_bytes(&self) -> usize {
         self.lock().n_bytes
@@ -281,6 +292,16 @@ mod tests {
         (0..5).for_each(|k| assert!(cache.insert(B, k, k, 100)));
         (0..100).for_each(|k| assert!(cache.insert(A, k, k, 100)));
         assert_eq!((keys(&cache, A), keys(&cache, B)), ((95..100).collect(), (0..5).collect()));
+    }
+
+    #[test]
+    fn the_latest_used_come_first_and_keep_their_places() {
+        let cache = FairCache::new(1_000_000);
+        (0..6).for_each(|key| assert!(cache.insert(A, key, 10 * key, 100)));
+        cache.insert(B, 8, 80, 100);
+        cache.get(A, &2);
+        assert_eq!(cache.latest(A, 2, |key| key % 2 == 0), [20, 40]);
+        assert_eq!(cache.latest(A, 9, |key| key % 2 == 0), [20, 40, 0]);
     }
 
     #[test]

@@ -61,6 +61,8 @@ pub struct FitKey {
     pub cloud_id: CloudId,
     /// BLAKE3 hash of kernel, regularization, solver and whether duplicates were merged.
     fit: [u8; 32],
+    /// Bits of the tolerance, if the solver iterates.
+    tolerance: Option<u64>,
 }
 
 impl FitKey {
@@ -84,9 +86,6 @@ impl FitKey {
                 hasher.update(b"local");
             }
         }
-        if let Some(tolerance) = recipe.tolerance() {
-            update_with_floats(&mut hasher, &[tolerance]);
-        }
         if let Some((kernel, regularization)) = recipe.process() {
             hasher.update(&[u8::from(is_merged)]);
             update_with_kernel(&mut hasher, kernel);
@@ -97,7 +96,13 @@ impl FitKey {
             Some(Learning::AtSites(sites)) => update_with_floats(&mut hasher, sites.coordinates()),
             Some(Learning::Known(known)) => update_with_hyperparameters(&mut hasher, known),
         }
-        Self { owner, cloud_id, fit: hasher.finalize().into() }
+        let tolerance = recipe.tolerance().map(f64::to_bits);
+        Self { owner, cloud_id, fit: hasher.finalize().into(), tolerance }
+    }
+
+    /// Returns whether both are of one system, which is iterated to one tolerance or another.
+    pub fn is_iterated_like(&self, other: &Self) -> bool {
+        self.tolerance.is_some() && Self { tolerance: other.tolerance, ..*self } == *other
     }
 }
 
@@ -270,6 +275,15 @@ mod tests {
             of_local(Recipe::LocalSurface { learning: None }),
             of_local(Recipe::LocalSurface { learning: Some(Learning::AtSites(cloud.clone().into())) }),
         ];
+        let iterated = |tolerance: f64, alpha: f64| {
+            of_local(
+                recipe(SolverKind::Iterative, &gauss, &Regularization::Uniform(alpha))
+                    .with_tolerance(tolerance),
+            )
+        };
+        assert!(iterated(1e-6, 0.0).is_iterated_like(&iterated(1e-9, 0.0)));
+        assert!(!iterated(1e-6, 0.0).is_iterated_like(&iterated(1e-6, 1.0)));
+        assert!(!keys[0].is_iterated_like(&keys[0]));
         let distinct: std::collections::HashSet<_> = keys.iter().collect();
         assert_eq!(distinct.len(), keys.len());
     }

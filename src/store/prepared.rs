@@ -12,12 +12,15 @@ use super::single_flight::{Boarding, SingleFlight};
 use gramian_numerics::machine::heap::{arc_payload, block_bytes};
 use gramian_numerics::machine::pages::SpareBuffer;
 use gramian_numerics::model::Model;
-use gramian_numerics::solver::{Solution, Solver};
+use gramian_numerics::solver::{Known, Solution, Solver};
 use gramian_numerics::surface::Surface;
 
 /// Divisor of the cache size that gives the share of weights: they are n numbers beside the n² of a dense
 /// solver.
 const WEIGHTS_SHARE: usize = 16;
+
+/// Earlier solutions from which a new one may start. Their vectors fit into the memory of the iteration.
+const EARLIER: usize = 4;
 
 /// A model, the surface of its cloud once that was needed, and the time to make the model.
 ///
@@ -320,9 +323,19 @@ impl<E: Clone + Send + Sync + 'static> PreparedStore<E> {
         Missing { solver, surface: with_surface && !self.surfaces.is_under_way(&key) }
     }
 
-    /// Returns the cached weights of values that were solved before.
-    pub fn solution(&self, key: FitKey, values: ValuesKey) -> Option<Arc<Solution>> {
-        self.solutions.get(key.owner, &(key, values)).map(|kept| kept.solution.clone())
+    /// Returns a cached fit of the same system to another tolerance, whose preparation serves this one too.
+    pub fn to_another_tolerance(&self, key: FitKey) -> Option<Arc<PreparedFit>> {
+        self.fits.latest(key.owner, 1, |other| key.is_iterated_like(other)).pop()
+    }
+
+    /// Returns the cached weights of values that were solved before, or the latest of others.
+    pub fn known(&self, key: FitKey, values: ValuesKey) -> Known {
+        let these = self.solutions.get(key.owner, &(key, values)).map(|kept| kept.solution.clone());
+        if these.is_some() {
+            return Known { these, earlier: Vec::new() };
+        }
+        let latest = self.solutions.latest(key.owner, EARLIER, |(other, _)| key.is_iterated_like(other));
+        Known { these, earlier: latest.into_iter().map(|kept| kept.solution.clone()).collect() }
     }
 
     /// Caches weights, if memory for them is free.

@@ -125,6 +125,8 @@ async fn an_iteration_ends_within_the_tolerance_or_is_refused() {
     };
     let mut iterations = Vec::new();
     for tolerance in [1e-6, 1e-11] {
+        // No solution of another request may help.
+        let server = Server::start().await;
         let answer = server.post("/v1/interpolation", &asked(tolerance, 1e-4)).await.expect_ok();
         let diagnostics = &answer["diagnostics"];
         assert_eq!(diagnostics["tolerance"], tolerance);
@@ -138,6 +140,40 @@ async fn an_iteration_ends_within_the_tolerance_or_is_refused() {
     let refused = server.post("/v1/interpolation", &hopeless).await;
     let problem = refused.expect_problem(422, "not-converged");
     assert_eq!(problem["errors"][0]["pointer"], "/tolerance", "{problem}");
+}
+
+#[tokio::test]
+async fn tighter_tolerances_and_values_that_hardly_change_start_from_earlier_solutions() {
+    let tight = 1e-10;
+    let asked = |tolerance: f64, time: f64| {
+        let more = json!({"values": true, "queries": [[0.6, 0.8, 0.0]], "tolerance": tolerance});
+        let mut body = body("iterative", &rough(), &more);
+        let now = |value: f64| value * (1.0 + 0.1 * time);
+        body["values"] =
+            numbers(&body["values"]).into_iter().map(now).map(|value| value + time.sin()).collect();
+        body
+    };
+    let iterations = |answer: &Value| {
+        let diagnostics = &answer["diagnostics"];
+        assert!(
+            diagnostics["relative_residual"].as_f64().unwrap() <= diagnostics["tolerance"].as_f64().unwrap()
+        );
+        diagnostics["iterations"].as_u64().unwrap()
+    };
+    let alone = Server::start().await;
+    let cold = alone.post("/v1/interpolation", &asked(tight, 0.0)).await.expect_ok();
+    let server = Server::start().await;
+    server.post("/v1/interpolation", &asked(1e-6, 0.0)).await.expect_ok();
+    let tightened = server.post("/v1/interpolation", &asked(tight, 0.0)).await.expect_ok();
+    assert!(2 * iterations(&tightened) <= iterations(&cold) + 1, "{tightened}");
+    check_near(&tightened["values"], &cold["values"], 1e-8);
+    // The sums of the values move with the time, as those of a sensor.
+    for time in [1e-3, 2e-3, 3e-3] {
+        let moved = server.post("/v1/interpolation", &asked(tight, time)).await.expect_ok();
+        assert!(iterations(&moved) < iterations(&cold), "{moved}");
+        let expected = alone.post("/v1/interpolation", &asked(tight, time)).await.expect_ok();
+        check_near(&moved["values"], &expected["values"], 1e-8);
+    }
 }
 
 #[tokio::test]

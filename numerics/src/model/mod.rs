@@ -22,7 +22,7 @@ use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::points::sampling::Sampling;
 use crate::solver::trend::Mean;
-use crate::solver::{Method, Solution, Solver};
+use crate::solver::{Known, Method, Solution, Solver, Sought};
 use crate::surface::Surface;
 use crate::surface::local::{Given, LocalSurface};
 use crate::surface::signature::{Signature, SignatureSurface};
@@ -47,8 +47,8 @@ pub struct SurfaceMaking<'a> {
     pub cloud: &'a Arc<Cloud>,
     pub sampling: Arc<Sampling>,
     pub given: Given<'a>,
-    /// Weights of the signature function, which interpolates the constant 1, if they are known.
-    pub signature: Option<Arc<Solution>>,
+    /// What is known of the weights of the signature function, which interpolates the constant 1.
+    pub signature: Known,
 }
 
 impl Model {
@@ -111,7 +111,7 @@ impl Model {
 
     /// Returns the function with values `[n]`, unit V, at the fitted points.
     ///
-    /// `known` holds its weights, if they were solved before.
+    /// `known` holds its weights, or those of other values, if they were solved before.
     ///
     /// # Errors
     /// Returns the errors of [`Interpolant::fit_with_mean`], and [`NumericsError::Unsupported`] where each
@@ -120,14 +120,21 @@ impl Model {
         &self,
         values: &[f64],
         mean: Mean,
-        known: Option<Arc<Solution>>,
+        known: Known,
         observer: &dyn Observer,
     ) -> Result<Interpolant> {
         let solver = self.solver()?.clone();
-        match known {
-            Some(solution) => Ok(Interpolant { solver, solution }),
-            None => Interpolant::fit_with_mean(solver, values, mean, observer),
-        }
+        let sought = Sought { values, earlier: &known.earlier };
+        let solution = match known.these {
+            Some(solution) => solution,
+            None => Arc::new(Solution::starting(&solver, sought, mean, observer)?),
+        };
+        Ok(Interpolant { solver, solution })
+    }
+
+    /// Returns the model with another tolerance, which takes no work. `None` unless its solver iterates.
+    pub fn with_tolerance(&self, tolerance: f64) -> Option<Self> {
+        Some(Self::System(Arc::new(self.solver().ok()?.with_tolerance(tolerance)?)))
     }
 
     /// Returns the surface that the points sample: a level of the signature function, or local regressions.
@@ -141,8 +148,8 @@ impl Model {
             Self::LocalSurface => Ok(LocalSurface::of(cloud.clone(), sampling, given, observer)?.into()),
             Self::LocalKriging(_) => Err(self.lacks(Quantity::Geometry)),
             Self::System(solver) => {
-                let signature = match signature {
-                    None => Signature::fit(solver.clone(), observer)?,
+                let signature = match signature.these {
+                    None => Signature::fit_after(solver.clone(), &signature.earlier, observer)?,
                     Some(solution) => {
                         Signature::of(Interpolant { solver: solver.clone(), solution }, observer)?
                     }

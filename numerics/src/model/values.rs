@@ -1,7 +1,5 @@
 //! Functions through values, evaluated at queries by the solver of the model.
 
-use std::sync::Arc;
-
 use super::{Model, Report};
 use crate::error::{NumericsError, Quantity, Result};
 use crate::function::batch::{Batch, BatchJets};
@@ -11,7 +9,7 @@ use crate::function::local_kriging::{KrigingRequest, LocalKriging};
 use crate::function::posterior::{Variances, variances_with_mean};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
-use crate::solver::Solution;
+use crate::solver::Known;
 use crate::solver::trend::{Mean, Trend};
 use crate::sums::jets::{JetOrder, Jets};
 
@@ -64,8 +62,8 @@ pub struct EachAt {
 }
 
 impl Model {
-    /// Returns the function with these values, evaluated at queries. `known` holds its weights, if solved
-    /// before.
+    /// Returns the function with these values, evaluated at queries. `known` holds its weights, or
+    /// those of other values, if solved before.
     ///
     /// # Errors
     /// Returns the errors of [`Interpolant::fit_with_mean`] and [`Interpolant::at`], or of
@@ -75,7 +73,7 @@ impl Model {
         &self,
         fitted: FittedValues<'_>,
         request: JetRequest<'_>,
-        known: Option<Arc<Solution>>,
+        known: Known,
         observer: &dyn Observer,
     ) -> Result<ValuesAt> {
         match self {

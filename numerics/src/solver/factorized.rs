@@ -146,6 +146,14 @@ impl Solver {
         Ok(Self { system, factorization, norm1, reciprocal_condition: None, weights_of_one: Vec::new() })
     }
 
+    /// Returns the solver with another tolerance, which takes no work. `None` unless it iterates.
+    pub fn with_tolerance(&self, tolerance: f64) -> Option<Self> {
+        let iterative = self.iterative()?.with_tolerance(tolerance);
+        let factorization = Factorization::Iterative(Box::new(iterative));
+        let (system, norm1) = (self.system.clone(), self.norm1);
+        Some(Self { system, factorization, norm1, reciprocal_condition: None, weights_of_one: Vec::new() })
+    }
+
     pub fn system(&self) -> &System {
         &self.system
     }

@@ -14,8 +14,8 @@ use gramian_numerics::model::{FittedValues, Model};
 use gramian_numerics::observer::WithoutStages;
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::selection::{Learned, Noise, Observed, learn};
-use gramian_numerics::solver::Solution;
 use gramian_numerics::solver::trend::Mean;
+use gramian_numerics::solver::{Known, Solution};
 use gramian_numerics::surface::Surface;
 
 /// The fits of one request.
@@ -79,16 +79,17 @@ impl Fits {
         self.with_known_weights(key, solve, |function| Some(&function.solution))
     }
 
-    /// Solves with cached weights of these values, if there are any. New weights are cached.
+    /// Solves with cached weights of these values, or from those of others, if there are any. New weights are
+    /// cached.
     pub(super) fn with_known_weights<T>(
         &self,
         values: ValuesKey,
-        solve: impl FnOnce(Option<Arc<Solution>>) -> Result<T, NumericsError>,
+        solve: impl FnOnce(Known) -> Result<T, NumericsError>,
         solution: impl FnOnce(&T) -> Option<&Arc<Solution>>,
     ) -> Result<T, Problem> {
         let key = self.main.plan.key;
-        let known = self.app.prepared.solution(key, values);
-        let is_new = known.is_none();
+        let known = self.app.prepared.known(key, values);
+        let is_new = known.these.is_none();
         let found = solve(known).map_err(|error| self.main.refused(error))?;
         if let Some(solution) = solution(&found).filter(|_| is_new) {
             self.app.prepared.keep_solution(key, values, solution.clone());

@@ -14,7 +14,7 @@ use crate::store::budget::Reservation;
 use crate::store::key::ValuesKey;
 use crate::store::prepared::{CacheOutcome, Missing, PreparedFit};
 use gramian_numerics::model::price::MakingPrice;
-use gramian_numerics::model::{Making, SurfaceMaking};
+use gramian_numerics::model::{Making, Model, SurfaceMaking};
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::solver::Workspace;
 use gramian_numerics::surface::Surface;
@@ -285,6 +285,9 @@ async fn prepare(
     if let Some(model) = plan.recipe.made_at_once() {
         return Ok(PreparedFit::at_once(model, memory));
     }
+    if let Some(model) = retuned(&app, &plan) {
+        return Ok(PreparedFit::at_once(model, memory));
+    }
     if let Some(model) = factors::restore(&app, &admission, &plan).await {
         return Ok(PreparedFit::restored(model, memory));
     }
@@ -314,6 +317,12 @@ async fn prepare(
     let (outcome, times) = app.compute.run(&admission, flops, job).await.map_err(FitFailure::Broken)?;
     let (model, memory) = outcome?;
     Ok(PreparedFit::new(model, times.gram, times.factor, memory))
+}
+
+/// Returns the model of a cached one that differs in its tolerance alone.
+fn retuned(app: &App, plan: &FitPlan) -> Option<Model> {
+    let found = app.prepared.to_another_tolerance(plan.key)?;
+    found.model().with_tolerance(plan.recipe.tolerance()?)
 }
 
 /// Returns the cached sampling, or `None` if duplicates were merged. The merged cloud is not registered.
@@ -349,8 +358,8 @@ fn make_surface(
             let normals = plan.fitted_normals();
             let given = Given { normals: normals.as_deref(), learning: plan.recipe.learning() };
             let ones = ValuesKey::of(&vec![1.0; plan.stored.cloud.n_points()]);
-            let signature = shared.prepared.solution(plan.key, ones);
-            let is_new = signature.is_none();
+            let signature = shared.prepared.known(plan.key, ones);
+            let is_new = signature.these.is_none();
             let making = SurfaceMaking { cloud: &plan.fitted, sampling, given, signature };
             let surface = stored.model().surface(making, observer)?;
             if let Some(signature) = surface.signature().filter(|_| is_new) {

@@ -19,6 +19,8 @@ mod order;
 pub(crate) mod price;
 mod product;
 
+use std::sync::Arc;
+
 use faer::MatMut;
 use rayon::prelude::*;
 
@@ -36,10 +38,11 @@ pub(super) const SOLVED_AT_ONCE: usize = 64;
 const LITTLE_SLACK: f64 = 1e-3;
 
 /// A system with a preconditioner.
+#[derive(Clone)]
 pub(super) struct Iterative {
     system: System,
-    inverse: InverseFactor,
-    product: Product,
+    inverse: Arc<InverseFactor>,
+    product: Arc<Product>,
     /// Largest relative residual of an answer.
     tolerance: f64,
 }
@@ -49,8 +52,14 @@ impl Iterative {
     /// [`NumericsError::Cancelled`].
     pub(super) fn of(system: &System, tolerance: f64, observer: &dyn Observer) -> Result<Self> {
         observer.enter(Stage::Factor);
-        let inverse = InverseFactor::of(system, observer)?;
-        Ok(Self { inverse, product: Product::of(system, observer)?, system: system.clone(), tolerance })
+        let inverse = Arc::new(InverseFactor::of(system, observer)?);
+        let product = Arc::new(Product::of(system, observer)?);
+        Ok(Self { inverse, product, system: system.clone(), tolerance })
+    }
+
+    /// The same with another tolerance.
+    pub(super) fn with_tolerance(&self, tolerance: f64) -> Self {
+        Self { tolerance, ..self.clone() }
     }
 
     pub(super) fn tolerance(&self) -> f64 {

@@ -5,7 +5,8 @@ use crate::kernel::{Family, Kernel};
 use crate::machine::vector::norm;
 use crate::observer::Unobserved;
 use crate::points::cloud::Cloud;
-use crate::solver::{Solution, Solver};
+use crate::solver::trend::Mean;
+use crate::solver::{Solution, Solver, Sought};
 use crate::sums::regularization::Regularization;
 use crate::testing::Random;
 
@@ -134,4 +135,64 @@ fn products_are_as_exact_as_they_need_be() {
     }
     let few = iterations(system(torus(7_500, 6), matern(1), Regularization::uniform(1e-3).unwrap()), 1e-9);
     assert!(iterations(of, 1e-9) < 2 * few);
+}
+
+/// Solves for values from earlier solutions, to a tolerance of 1e-9.
+fn from(earlier: &[Arc<Solution>], solver: &Solver, values: &[f64]) -> Arc<Solution> {
+    let found = Solution::starting(solver, Sought { values, earlier }, Mean::Zero, &Unobserved).unwrap();
+    assert!(found.relative_residual <= 1e-9, "{}", found.relative_residual);
+    Arc::new(found)
+}
+
+#[test]
+fn values_near_earlier_ones_take_fewer_iterations() {
+    let of = system(torus(2_000, 7), matern(1), Regularization::uniform(1e-4).unwrap());
+    let at = |time: f64| -> Vec<f64> {
+        of.cloud().points().map(|x| ((2.0 + time) * x[0]).sin() + (time * x[1]).cos() * x[2]).collect()
+    };
+    let solver = Solver::iterative_to(1e-9, of.clone(), &Unobserved).unwrap();
+    let cold = from(&[], &solver, &at(0.06));
+    let n_iterations = |of: &Solution| of.n_iterations.unwrap();
+    // The latest is first. Of values that change evenly, more of them leave less.
+    let (mut earlier, mut taken): (Vec<Arc<Solution>>, _) = (Vec::new(), Vec::new());
+    for step in 0..4 {
+        let found = from(&earlier, &solver, &at(0.02 * f64::from(step)));
+        taken.push(n_iterations(&found));
+        earlier.insert(0, found);
+    }
+    assert!(taken[1] < taken[0] && taken[3] + 2 <= taken[0], "{taken:?}");
+    let off = earlier[0].weights.iter().zip(&cold.weights).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+    assert!(off <= 1e-5 * norm(&cold.weights), "{off:e}");
+    // The same again, and a multiple of it, are known already.
+    assert_eq!(n_iterations(&from(&earlier, &solver, &at(0.02))), 0);
+    let larger: Vec<f64> = at(0.04).iter().map(|value| -1e200 * value).collect();
+    assert_eq!(n_iterations(&from(&earlier, &solver, &larger)), 0);
+}
+
+#[test]
+fn a_tighter_tolerance_takes_the_iterations_that_are_left() {
+    let of = system(torus(2_000, 8), matern(1), Regularization::uniform(1e-4).unwrap());
+    let values = field(of.cloud());
+    let coarse = Solver::iterative_to(1e-5, of, &Unobserved).unwrap();
+    let fine = coarse.with_tolerance(1e-9).unwrap();
+    let cold = from(&[], &fine, &values).n_iterations.unwrap();
+    let first = Arc::new(Solution::of(&coarse, &values, &Unobserved).unwrap());
+    let warm = from(std::slice::from_ref(&first), &fine, &values).n_iterations.unwrap();
+    assert!(warm < cold && warm + first.n_iterations.unwrap() <= cold + 1, "{warm} {cold}");
+}
+
+#[test]
+fn earlier_solutions_without_relation_change_nothing() {
+    let of = system(torus(500, 9), matern(1), Regularization::uniform(1e-4).unwrap());
+    let values = field(of.cloud());
+    let solver = Solver::iterative_to(1e-9, of, &Unobserved).unwrap();
+    let cold = from(&[], &solver, &values);
+    let rough: Vec<f64> = (0..500).map(|i| f64::from(i % 2)).collect();
+    let other = from(&[], &solver, &rough);
+    let huge: Vec<f64> = rough.iter().map(|value| 1e300 * value).collect();
+    let zero = from(&[], &solver, &[0.0; 500]);
+    let earlier = [other.clone(), zero, from(&[], &solver, &huge), other];
+    assert_eq!(*from(&earlier, &solver, &values), *cold);
+    let nothing = from(&earlier, &solver, &[0.0; 500]);
+    assert!(nothing.weights.iter().all(|weight| *weight == 0.0));
 }

@@ -1,7 +1,8 @@
 //! Weights by landmarks and by conjugate gradients.
 
-use super::Solution;
 use super::candidate::{Candidate, MAX_RELATIVE_RESIDUAL, norm2};
+use super::warm_start::warm_start;
+use super::{Solution, Sought};
 use crate::error::{NotDefinite, NumericsError, Result};
 use crate::observer::Observer;
 use crate::solver::Solver;
@@ -29,8 +30,8 @@ impl Solution {
             return Err(NumericsError::WeightsOverflow);
         }
         let solution = if landmarks.preconditions() {
-            let weights = Some(fitted.weights);
-            let iteration = Iteration { of: landmarks, weights, tolerance: LANDMARK_TOLERANCE };
+            let start = Candidate::new(solver, values, fitted.weights, None, observer)?;
+            let iteration = Iteration { of: landmarks, start, tolerance: LANDMARK_TOLERANCE };
             iteration.run(solver, values, observer)?
         } else {
             let TrueResidual { relative, max } = TrueResidual::of(landmarks, values, &fitted, observer)?;
@@ -44,6 +45,7 @@ impl Solution {
                 energy: fitted.energy,
                 refined: false,
                 n_iterations: None,
+                product: Vec::new(),
                 trend: None,
                 outlier: None,
             }
@@ -55,27 +57,36 @@ impl Solution {
         Ok(solution)
     }
 
-    /// Solves by conjugate gradients to their tolerance.
+    /// Solves by conjugate gradients to their tolerance, from earlier solutions where they are near.
     pub(super) fn iterated(
         solver: &Solver,
         iterative: &Iterative,
-        values: &[f64],
+        sought: Sought<'_>,
         observer: &dyn Observer,
     ) -> Result<Self> {
-        let iteration = Iteration { of: iterative, weights: None, tolerance: iterative.tolerance() };
+        let (values, tolerance) = (sought.values, iterative.tolerance());
+        let start = match warm_start(solver, sought) {
+            None => Candidate::nothing(solver, values),
+            // Nothing is left to iterate, but the residual of an answer is always summed afresh.
+            Some(start) if start.relative_residual(values) <= tolerance => {
+                Candidate::new(solver, values, start.weights, None, observer)?
+            }
+            Some(start) => start,
+        };
+        let iteration = Iteration { of: iterative, start, tolerance };
         let solution = iteration.run(solver, values, observer)?;
         let relative_residual = solution.relative_residual;
-        if relative_residual.is_nan() || relative_residual > iterative.tolerance() {
+        if relative_residual.is_nan() || relative_residual > tolerance {
             return Err(iterative.not_converged(relative_residual));
         }
         Ok(solution)
     }
 }
 
-/// Conjugate gradients on the true system from given weights, or from none.
+/// Conjugate gradients on the true system from a start.
 struct Iteration<'a> {
     of: &'a dyn Preconditioned,
-    weights: Option<Vec<f64>>,
+    start: Candidate,
     tolerance: f64,
 }
 
@@ -83,11 +94,7 @@ impl Iteration<'_> {
     /// Iterates, again for what is left where the true residual is not that of the recurrence. The caller
     /// sees to the residual.
     fn run(self, solver: &Solver, values: &[f64], observer: &dyn Observer) -> Result<Solution> {
-        let nothing = || vec![0.0; values.len()];
-        let (mut left, mut n_iterations) = match self.weights {
-            Some(weights) => (Candidate::new(solver, values, weights, None, observer)?, 0),
-            None => (Candidate::evaluated(solver, values, nothing(), nothing()), 0),
-        };
+        let (mut left, mut n_iterations) = (self.start, 0);
         for _ in 0..RESTARTS {
             let part = left.relative_residual(values);
             if part <= self.tolerance {
@@ -101,6 +108,7 @@ impl Iteration<'_> {
             }
             left = Candidate::new(solver, values, weights, None, observer)?;
         }
-        Ok(Solution { n_iterations: Some(n_iterations), ..left.into_solution(solver, values, false) })
+        let (n_iterations, product) = (Some(n_iterations), left.product(values));
+        Ok(Solution { n_iterations, product, ..left.into_solution(solver, values, false) })
     }
 }

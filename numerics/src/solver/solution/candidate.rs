@@ -55,6 +55,11 @@ impl Candidate {
         Ok(Self { jets, ..Self::evaluated(solver, values, weights, at_points) })
     }
 
+    /// No weights, whose residual is the values.
+    pub(super) fn nothing(solver: &Solver, values: &[f64]) -> Self {
+        Self::evaluated(solver, values, vec![0.0; values.len()], vec![0.0; values.len()])
+    }
+
     /// Creates a candidate from a given `KΛ`.
     pub(super) fn evaluated(solver: &Solver, values: &[f64], weights: Vec<f64>, at_points: Vec<f64>) -> Self {
         let residual = (0..values.len())
@@ -99,6 +104,11 @@ impl Candidate {
         Ok((self.into_solution(solver, values, refined), jets))
     }
 
+    /// `(K + αI)Λ`.
+    pub(super) fn product(&self, values: &[f64]) -> Vec<f64> {
+        values.iter().zip(&self.residual).map(|(y, left)| y - left).collect()
+    }
+
     /// The solution as it stands.
     pub(super) fn into_solution(self, solver: &Solver, values: &[f64], refined: bool) -> Solution {
         let native_norm_squared = self.weights.iter().zip(&self.at_points).map(|(w, u)| w * u).sum();
@@ -114,6 +124,7 @@ impl Candidate {
             energy,
             refined,
             n_iterations: None,
+            product: Vec::new(),
             trend: None,
             outlier: None,
         }

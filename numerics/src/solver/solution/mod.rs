@@ -4,6 +4,9 @@ mod by_iteration;
 mod candidate;
 mod many;
 mod residuals;
+mod warm_start;
+
+use std::sync::Arc;
 
 use faer::MatMut;
 
@@ -37,11 +40,38 @@ pub struct Solution {
     pub refined: bool,
     /// Number of iterations, if the solver iterates.
     pub n_iterations: Option<usize>,
+    /// `(K + αI)Λ`, `[n]`, from which a later solve may start. Empty unless the solver iterates.
+    pub product: Vec<f64>,
     /// The mean, if there is one.
     pub trend: Option<Trend>,
     /// The value that the others explain worst, under the variance of the solver's kernel. `None` if it was
     /// not looked for.
     pub outlier: Option<Outlier>,
+}
+
+/// Values `[n]` to be solved for, and solutions of the same system for others, or to another tolerance.
+///
+/// A solver that iterates starts from the earlier ones. The others have no use for them.
+#[derive(Clone, Copy)]
+pub struct Sought<'a> {
+    pub values: &'a [f64],
+    pub earlier: &'a [Arc<Solution>],
+}
+
+impl<'a> Sought<'a> {
+    /// Values of a system that was not solved before.
+    pub fn first(values: &'a [f64]) -> Self {
+        Self { values, earlier: &[] }
+    }
+}
+
+/// What was solved before with the same system.
+#[derive(Default)]
+pub struct Known {
+    /// Weights of the values that are asked for.
+    pub these: Option<Arc<Solution>>,
+    /// Weights of other values, or to another tolerance. The latest is first.
+    pub earlier: Vec<Arc<Solution>>,
 }
 
 impl Solution {
@@ -52,7 +82,7 @@ impl Solution {
     /// [`NumericsError::LengthMismatch`], [`NumericsError::WeightsOverflow`], [`NumericsError::Cancelled`].
     /// [`NumericsError::NotPositiveDefinite`] if the residual exceeds 1e-5 or the backward error 1e-13.
     pub fn of(solver: &Solver, values: &[f64], observer: &dyn Observer) -> Result<Self> {
-        Ok(Self::solve(solver, values, None, observer)?.0)
+        Ok(Self::with_jets(solver, Sought::first(values), None, observer)?.0)
     }
 
     /// Computes [`Solution::of`] for a function with a mean, and finds the value that the others explain
@@ -61,44 +91,52 @@ impl Solution {
     /// # Errors
     /// [`NumericsError::MeanNotDetermined`], and the errors of [`Solution::of`].
     pub fn with_mean(solver: &Solver, values: &[f64], mean: Mean, observer: &dyn Observer) -> Result<Self> {
+        Self::starting(solver, Sought::first(values), mean, observer)
+    }
+
+    /// Computes [`Solution::with_mean`], from earlier solutions where that takes less work. Weights depend on
+    /// them within the tolerance.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Solution::with_mean`].
+    pub fn starting(
+        solver: &Solver,
+        sought: Sought<'_>,
+        mean: Mean,
+        observer: &dyn Observer,
+    ) -> Result<Self> {
+        let Sought { values, earlier } = sought;
         solver.cloud().check_one_per_point(values)?;
         observer.enter(Stage::Solve);
         let found = match Trend::fit(solver, values, mean, observer)? {
-            None => Self::of(solver, values, observer)?,
+            None => Self::with_jets(solver, sought, None, observer)?.0,
             Some(trend) => {
                 let rest = trend.removed_from(values, solver.cloud());
-                Self { trend: Some(trend), ..Self::of(solver, &rest, observer)? }
+                let rest = Sought { values: &rest, earlier };
+                Self { trend: Some(trend), ..Self::with_jets(solver, rest, None, observer)?.0 }
             }
         };
         let outlier = Outlier::of(solver, &found.weights, observer)?;
         Ok(Self { outlier, ..found })
     }
 
-    /// Computes [`Solution::of`] with the jets of the function at the points. Their values are needed for the
-    /// residual anyway.
+    /// Computes [`Solution::of`], and the jets of the function at the points if they are asked for. Their
+    /// values are needed for the residual anyway.
     ///
     /// # Errors
     /// [`NumericsError::Overflow`] of derivatives, and the errors of [`Solution::of`].
     pub(crate) fn with_jets(
         solver: &Solver,
-        values: &[f64],
-        order: JetOrder,
-        observer: &dyn Observer,
-    ) -> Result<(Self, Option<Jets>)> {
-        Self::solve(solver, values, Some(order), observer)
-    }
-
-    fn solve(
-        solver: &Solver,
-        values: &[f64],
+        sought: Sought<'_>,
         order: Option<JetOrder>,
         observer: &dyn Observer,
     ) -> Result<(Self, Option<Jets>)> {
+        let values = sought.values;
         solver.cloud().check_one_per_point(values)?;
         observer.enter(Stage::Solve);
         let by_other_means = match (solver.landmarks(), solver.iterative()) {
             (Some(landmarks), _) => Some(Self::on_landmarks(solver, landmarks, values, observer)?),
-            (None, Some(iterative)) => Some(Self::iterated(solver, iterative, values, observer)?),
+            (None, Some(iterative)) => Some(Self::iterated(solver, iterative, sought, observer)?),
             (None, None) => None,
         };
         if let Some(solution) = by_other_means {
@@ -133,7 +171,7 @@ impl Solution {
 
     /// Bytes held on the heap.
     pub fn n_bytes(&self) -> usize {
-        vec_bytes(&self.weights) + self.trend.as_ref().map_or(0, Trend::n_bytes)
+        vec_bytes(&self.weights) + vec_bytes(&self.product) + self.trend.as_ref().map_or(0, Trend::n_bytes)
     }
 }
 

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::function::interpolant::Interpolant;
 use crate::machine::heap::vec_bytes;
 use crate::observer::Observer;
-use crate::solver::{Solution, Solver};
+use crate::solver::{Solution, Solver, Sought};
 use crate::sums::jets::{JetOrder, Jets};
 use crate::surface::degeneracy::roundings;
 
@@ -34,12 +34,22 @@ impl Signature {
     /// # Errors
     /// Returns the errors of `Solution::with_jets`.
     pub fn fit(solver: Arc<Solver>, observer: &dyn Observer) -> Result<Self> {
+        Self::fit_after(solver, &[], observer)
+    }
+
+    /// Computes [`Signature::fit`] from earlier solutions, to other tolerances.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Signature::fit`].
+    pub fn fit_after(
+        solver: Arc<Solver>,
+        earlier: &[Arc<Solution>],
+        observer: &dyn Observer,
+    ) -> Result<Self> {
         let ones = vec![1.0; solver.n_points()];
-        let (solution, jets) = if solver.kernel().has_kink() {
-            (Solution::of(&solver, &ones, observer)?, None)
-        } else {
-            Solution::with_jets(&solver, &ones, JetOrder::Hessian, observer)?
-        };
+        let sought = Sought { values: &ones, earlier };
+        let order = (!solver.kernel().has_kink()).then_some(JetOrder::Hessian);
+        let (solution, jets) = Solution::with_jets(&solver, sought, order, observer)?;
         Self::with(Interpolant { solver, solution: Arc::new(solution) }, jets, observer)
     }
 
