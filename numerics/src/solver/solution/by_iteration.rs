@@ -65,7 +65,7 @@ impl Solution {
         observer: &dyn Observer,
     ) -> Result<Self> {
         let (values, tolerance) = (sought.values, iterative.tolerance());
-        let start = match warm_start(solver, sought) {
+        let start = match warm_start(solver, sought, observer)? {
             None => Candidate::nothing(solver, values),
             // Nothing is left to iterate, but the residual of an answer is always summed afresh.
             Some(start) if start.relative_residual(values) <= tolerance => {

@@ -7,7 +7,9 @@
 
 use super::Sought;
 use super::candidate::Candidate;
+use crate::error::Result;
 use crate::machine::vector::{dot, norm};
+use crate::observer::Observer;
 use crate::solver::Solver;
 
 /// Part of the values that a start may leave. One that leaves more saves less than an iteration, and values
@@ -24,11 +26,19 @@ struct Direction {
 }
 
 /// Returns the best start, if it is worth it.
-pub(super) fn warm_start(solver: &Solver, sought: Sought<'_>) -> Option<Candidate> {
+///
+/// # Errors
+/// [`crate::error::NumericsError::Cancelled`].
+pub(super) fn warm_start(
+    solver: &Solver,
+    sought: Sought<'_>,
+    observer: &dyn Observer,
+) -> Result<Option<Candidate>> {
     let Sought { values, earlier } = sought;
     let mut left = Direction { weights: vec![0.0; values.len()], product: values.to_vec() };
     let mut basis: Vec<Direction> = Vec::with_capacity(earlier.len());
     for solution in earlier.iter().filter(|solution| solution.product.len() == values.len()) {
+        observer.checkpoint()?;
         let (weights, product) = (solution.weights.clone(), solution.product.clone());
         if let Some(direction) = (Direction { weights, product }).orthogonal_to(&basis) {
             left.remove(&direction);
@@ -38,12 +48,12 @@ pub(super) fn warm_start(solver: &Solver, sought: Sought<'_>) -> Option<Candidat
     let weights: Vec<f64> = left.weights.iter().map(|weight| -weight).collect();
     // What is not finite is not worth it either.
     if !(norm(&left.product) < WORTH * norm(values) && weights.iter().all(|weight| weight.is_finite())) {
-        return None;
+        return Ok(None);
     }
     let noise = solver.regularization();
     let at_point = |i: usize| values[i] - left.product[i] - noise.at(i) * weights[i];
     let at_points = (0..values.len()).map(at_point).collect();
-    Some(Candidate::evaluated(solver, values, weights, at_points))
+    Ok(Some(Candidate::evaluated(solver, values, weights, at_points)))
 }
 
 impl Direction {
