@@ -50,9 +50,10 @@ def posteriors(setting: Setting, client: Client) -> Iterable[Row]:
     if serves_safetensors(client):
         methods["ours, safetensors"] = lambda *data: by_safetensors(client, *data)
     if setting.with_gpytorch and importlib.util.find_spec("gpytorch"):
+        from ..gpytorch_peer import matern
         from ..gpytorch_peer import posterior as by_gpytorch
 
-        methods["GPyTorch"] = lambda *data: by_gpytorch(*data, LENGTH_SCALE, ALPHA)
+        methods["GPyTorch"] = lambda *data: by_gpytorch(*data, matern(LENGTH_SCALE), ALPHA)
     times, results = run(setting.rounds(4), methods, n, m)
     what = f"posterior mean and deviation, n = {n:,}, m = {m:,}"
     peer = Figure.of(times["scikit-learn"])

@@ -38,7 +38,7 @@ def main() -> None:
     if not arguments.binary.exists():
         sys.exit(f"there is no {arguments.binary}")
     use_cores(N_THREADS)
-    setting = Setting(ROOT, arguments.quick, with_gpytorch=False)
+    setting = Setting(ROOT, arguments.quick, arguments.with_gpytorch)
     fields = {"solver": arguments.solver} if arguments.solver else {}
     service = Service(setting, arguments.binary, fields)
     peers, dragon = Peers(setting, arguments.cached_peers), Dragon(setting.build / "scale")
@@ -80,6 +80,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--quick", action="store_true", help="a few thousand points: tests the harness, not gramian")
     parser.add_argument("--binary", type=Path, default=BINARY, help="a server already built")
     parser.add_argument("--solver", help="added to every request that names none, to see what one does that `auto` leaves out")
+    parser.add_argument("--with-gpytorch", action="store_true", help="also GPyTorch on the CPU: a download of gigabytes")
     parser.add_argument("--no-peers", action="store_true", help="gramian alone")
     parser.add_argument("--cached-peers", action="store_true", help="peers are not run again on what they were run on before")
     parser.add_argument("--strict", action="store_true", help="fails if a bound of a row does not hold")

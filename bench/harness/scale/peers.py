@@ -160,6 +160,21 @@ def process(points: Floats, values: Floats, queries: Floats, length_scale: float
     return {"means": means, "variances": deviations**2}
 
 
+def gpytorch(points: Floats, values: Floats, queries: Floats, length_scale: float, alpha: float) -> Arrays:
+    """GPyTorch's Gaussian process with a Gauss kernel, by Cholesky: means and variances."""
+    from ..gpytorch_peer import gauss, posterior
+
+    means, deviations = posterior(points, values, queries, gauss(length_scale), alpha)
+    return {"means": means, "variances": deviations**2}
+
+
+def gpytorch_mean(points: Floats, values: Floats, queries: Floats, length_scale: float, alpha: float) -> Arrays:
+    """The same by conjugate gradients, which it chooses by itself: means alone."""
+    from ..gpytorch_peer import gauss, mean
+
+    return {"means": mean(points, values, queries, gauss(length_scale), alpha)}
+
+
 def poisson(points: Floats, normals: Floats, size: int) -> Arrays:
     """Screened Poisson reconstruction to an octree of depth `size`, from the true normals.
 
@@ -197,6 +212,8 @@ METHODS: dict[str, Callable[..., Arrays]] = {
     "interpolation": interpolation,
     "ferreus": ferreus,
     "process": process,
+    "gpytorch": gpytorch,
+    "gpytorch_mean": gpytorch_mean,
     "poisson": poisson,
     "apss": apss,
 }
