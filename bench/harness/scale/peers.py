@@ -59,14 +59,11 @@ class Peers:
             rows = np.frombuffer(done.stdout).reshape(len(points), -1)
             return Done(float(seconds), int(peak), {"normals": rows[:, :3], "curvatures": rows[:, 3:]})
 
-        def fastest() -> Done:
-            return min((run() for _ in range(rounds)), key=lambda done: done.seconds)
-
         source = self._setting.root / "bench" / "peers" / "cgal_surface.cpp"
-        return self._once(["cgal", what, *arguments], source.read_text(), {"points": points}, fastest)
+        return self._once(["cgal", what, *arguments], source.read_text(), {"points": points}, lambda: fastest(run, rounds))
 
-    def python(self, name: str, arrays: Arrays, **arguments: float) -> Done:
-        """Runs one of `METHODS`."""
+    def python(self, name: str, arrays: Arrays, rounds: int = 1, **arguments: float) -> Done:
+        """Runs one of `METHODS`; returns the fastest of several rounds."""
         command = [str(self._setting.python), "-m", "harness.scale.peers", name, json.dumps(arguments)]
 
         def run() -> Done:
@@ -77,7 +74,7 @@ class Peers:
             seconds, peak = found.pop("cost")
             return Done(float(seconds), int(peak), found)
 
-        return self._once([name, arguments], inspect.getsource(METHODS[name]), arrays, run)
+        return self._once([name, arguments], inspect.getsource(METHODS[name]), arrays, lambda: fastest(run, rounds))
 
     @property
     def _environment(self) -> dict[str, str]:
@@ -96,6 +93,10 @@ class Peers:
         work = run()
         np.savez(kept, cost=np.array([work.seconds, work.peak_bytes]), **work.arrays)
         return work
+
+
+def fastest(run: Callable[[], Done], rounds: int) -> Done:
+    return min((run() for _ in range(rounds)), key=lambda done: done.seconds)
 
 
 def quadrics(points: Floats, n_neighbours: int, is_oriented: int) -> Arrays:
