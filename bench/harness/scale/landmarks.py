@@ -19,7 +19,7 @@ GAUSS = {"family": "gauss", "length_scale": 1.0}
 #: Noise variance of the values, and that of surfaces, which are exact.
 ALPHA = 1e-4
 SURFACE_ALPHA = 1e-10
-#: Rounds of a row that takes milliseconds, on both sides. Others on the machine take more than that from most of them.
+#: Rounds of a row that takes milliseconds, on both sides: others on the machine disturb most of them.
 N_ROUNDS = 15
 
 
