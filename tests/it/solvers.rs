@@ -148,9 +148,8 @@ async fn tighter_tolerances_and_values_that_hardly_change_start_from_earlier_sol
     let asked = |tolerance: f64, time: f64| {
         let more = json!({"values": true, "queries": [[0.6, 0.8, 0.0]], "tolerance": tolerance});
         let mut body = body("iterative", &rough(), &more);
-        let now = |value: f64| value * (1.0 + 0.1 * time);
-        body["values"] =
-            numbers(&body["values"]).into_iter().map(now).map(|value| value + time.sin()).collect();
+        let now = |value: f64| value * (1.0 + 0.1 * time) + time.sin();
+        body["values"] = numbers(&body["values"]).into_iter().map(now).collect();
         body
     };
     let iterations = |answer: &Value| {
@@ -167,7 +166,7 @@ async fn tighter_tolerances_and_values_that_hardly_change_start_from_earlier_sol
     let tightened = server.post("/v1/interpolation", &asked(tight, 0.0)).await.expect_ok();
     assert!(2 * iterations(&tightened) <= iterations(&cold) + 1, "{tightened}");
     check_near(&tightened["values"], &cold["values"], 1e-8);
-    // The sums of the values move with the time, as those of a sensor.
+    // Values that move with the time, as those of sensors do.
     for time in [1e-3, 2e-3, 3e-3] {
         let moved = server.post("/v1/interpolation", &asked(tight, time)).await.expect_ok();
         assert!(iterations(&moved) < iterations(&cold), "{moved}");
