@@ -319,8 +319,8 @@ async fn prepare(
     Ok(PreparedFit::new(model, times.gram, times.factor, memory))
 }
 
-/// Makes the model from a cached one that differs in its tolerance alone. What they share is reserved by both,
-/// so that either may be evicted.
+/// Makes the model from a cached one that differs in its tolerance alone. What they share is reserved by
+/// both, so that either may be evicted.
 fn retuned(app: &App, plan: &FitPlan) -> Option<Model> {
     let found = app.prepared.to_another_tolerance(plan.key)?;
     found.model().with_tolerance(plan.recipe.tolerance()?)
