@@ -6,7 +6,7 @@ import { OPERATIONS, quantitiesOf, remedyOf, requestOf } from "./model/operation
 import { pixelsOf, planeOf, valuesOn, WIDTH } from "./model/section.js";
 import { compute, download, Refusal, register, savedKey, saveKey } from "./model/service.js";
 import { LANGUAGES, snippet } from "./model/snippets.js";
-import { DEFAULTS, fromHash, toHash } from "./model/state.js";
+import { DEFAULTS, fromHash, toHash, wordsOf } from "./model/state.js";
 import { rangeOf, shown, sortedOf, SUPPORT } from "./view/colours.js";
 import { Histogram } from "./view/histogram.js";
 import {
@@ -29,8 +29,17 @@ const ASKED = [
   "duplicates",
 ];
 
+form.elements.namedItem("example").replaceChildren(
+  ...Object.entries(EXAMPLES).map(([name, { title }]) => new Option(title, name)),
+  new Option("a file of yours", ""),
+);
+form.elements.namedItem("operation").replaceChildren(
+  ...Object.entries(OPERATIONS).map(([name, { title }]) => new Option(title, name)),
+);
+const WORDS = wordsOf(form);
+
 const page = {
-  settings: fromHash(location.hash),
+  settings: fromHash(location.hash, WORDS),
   cloud: undefined,
   cloudId: undefined,
   answer: undefined,
@@ -121,7 +130,7 @@ logarithmic(at("alphaSlider"), "alpha", (power) => (power <= -9.99 ? 0 : 10 ** p
 window.addEventListener("popstate", () => {
   clearTimeout(page.keeping);
   const before = page.settings;
-  page.settings = fromHash(location.hash);
+  page.settings = fromHash(location.hash, WORDS);
   fillForm();
   if (before.example !== page.settings.example) loadExample();
   else ask();
@@ -161,6 +170,7 @@ async function load(make) {
     Object.assign(page, { cloud, cloudId: undefined });
     const { rows, width } = cloud.points;
     at("cloud").textContent = `${cloud.name}: ${rows.toLocaleString("en")} points in ${width} dimensions` +
+      (cloud.nLeftOut > 0 ? `, ${cloud.nLeftOut.toLocaleString("en")} rows without a position left out` : "") +
       (cloud.values.size > 0 ? `, with ${[...cloud.values.keys()].join(", ")}` : "");
     await showFirst(cloud);
   } catch (error) {
@@ -472,8 +482,9 @@ for (const button of document.querySelectorAll("[data-view]")) {
 
 function showRequest(request) {
   const { settings, cloudId, cloud } = page;
-  const given = { cloudId, operation: settings.operation, request, fileName: settings.example ? undefined : cloud?.name };
-  at("code").textContent = snippet(page.language, given);
+  const address = new URL(".", document.baseURI).href;
+  const fileName = settings.example ? undefined : cloud?.name;
+  at("code").textContent = snippet(page.language, { address, cloudId, operation: settings.operation, request, fileName });
 }
 
 at("languages").replaceChildren(...Object.entries(LANGUAGES).map(([language, title]) => {
@@ -551,13 +562,6 @@ const paint = () => {
 };
 dark.addEventListener("change", paint);
 
-form.elements.namedItem("example").replaceChildren(
-  ...Object.entries(EXAMPLES).map(([name, { title }]) => new Option(title, name)),
-  new Option("a file of yours", ""),
-);
-form.elements.namedItem("operation").replaceChildren(
-  ...Object.entries(OPERATIONS).map(([name, { title }]) => new Option(title, name)),
-);
 fillForm();
 paint();
 loadExample();

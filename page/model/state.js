@@ -29,25 +29,28 @@ export const DEFAULTS = {
   orthographic: false,
 };
 
-/** Words that other parts of the page rely on. */
-const WORDS = {
-  operation: ["curvatures", "normals", "mesh"],
-  section: ["none", "0", "1", "2"],
-  range: ["percentile", "full", "own"],
-  quality: ["regular", "raw"],
-  duplicates: ["refuse", "merge"],
-};
+/** Words of settings that are no choice of the form. */
+const WORDS = { colour: ["quantity", "support"] };
 
-/** Settings from the fragment of a link. Unknown names and senseless values are passed over. */
-export function fromHash(hash) {
+/**
+ * The words that each setting may have: the choices of the form. The quantities to colour by follow from an answer,
+ * and are looked up there.
+ */
+export function wordsOf(form) {
+  const choices = [...form.querySelectorAll("select")].filter(({ name }) => name !== "quantity");
+  return { ...WORDS, ...Object.fromEntries(choices.map(({ name, options }) => [name, Array.from(options, ({ value }) => value)])) };
+}
+
+/** Settings from the fragment of a link. Unknown names, unknown words and senseless numbers are passed over. */
+export function fromHash(hash, words) {
   const given = new URLSearchParams(hash.replace(/^#/, ""));
   const settings = { ...DEFAULTS };
   for (const [name, text] of given) {
-    if (!Object.hasOwn(DEFAULTS, name) || (WORDS[name] && !WORDS[name].includes(text))) continue;
+    if (!Object.hasOwn(DEFAULTS, name)) continue;
     const kind = typeof DEFAULTS[name];
     if (kind === "boolean") settings[name] = text === "true";
     else if (kind === "number") settings[name] = Number.isFinite(Number(text)) ? Number(text) : DEFAULTS[name];
-    else settings[name] = text;
+    else if (name === "quantity" || words[name]?.includes(text)) settings[name] = text;
   }
   return settings;
 }
