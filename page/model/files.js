@@ -1,12 +1,7 @@
 // Clouds from files: PLY, XYZ and CSV, PCD, npy and JSON.
 
+import { NORMALS, numberOf, POSITIONS, table } from "./tables.js";
 import { Tensor } from "./tensors.js";
-
-/** Names of the columns of normals, as programs write them. */
-const NORMALS = [
-  ["nx", "ny", "nz"],
-  ["normal_x", "normal_y", "normal_z"],
-];
 
 /** Reads a file by its content, or where that says nothing, by the ending of its name. */
 export async function readFile(file) {
@@ -17,19 +12,30 @@ export function read(bytes, name) {
   const start = latin(bytes.subarray(0, 256));
   if (start.startsWith("ply")) return cloudOf(ply(bytes), name);
   if (bytes[0] === 0x93 && start.slice(1, 6) === "NUMPY") return cloudOf(npy(bytes), name);
-  if (/^(#.*\n)*\s*VERSION|^# \.PCD/.test(start)) return cloudOf(pcd(bytes), name);
-  const text = new TextDecoder().decode(bytes);
+  if (/^(#.*\n)*\s*VERSION|^# \.PCD/.test(start)) {
+    const { columns, nLeftOut } = withoutGaps(pcd(bytes));
+    return { ...cloudOf(columns, name), nLeftOut };
+  }
+  const text = decoded(bytes);
   if (/^\s*[{[]/.test(text)) return ofJson(JSON.parse(text), name);
   return cloudOf(table(text), name);
+}
+
+/** A text without the mark that spreadsheets put before it. */
+function decoded(bytes) {
+  try {
+    return new TextDecoder("utf-8", { fatal: true }).decode(bytes);
+  } catch {
+    throw new Error("the file is not UTF-8: save it in that encoding");
+  }
 }
 
 /** A cloud from named columns: positions, normals if there are any, and everything else as values. */
 function cloudOf(columns, name) {
   const names = [...columns.keys()];
   const lower = new Map(names.map((column) => [column.toLowerCase(), column]));
-  const axes = ["x", "y", "z"].filter((axis) => lower.has(axis)).map((axis) => lower.get(axis));
-  const positions = axes.length >= 2 ? axes : names.slice(0, Math.min(3, names.length));
-  if (positions.length < 2) throw new Error("a cloud needs two or three coordinates in each row");
+  if (!lower.has("x") || !lower.has("y")) throw new Error(`the file has no columns x and y: ${names.join(", ")}`);
+  const positions = POSITIONS.filter((axis) => lower.has(axis)).map((axis) => lower.get(axis));
   const normals = NORMALS.map((group) => group.slice(0, positions.length).map((axis) => lower.get(axis)))
     .find((group) => group.every(Boolean));
   const others = names.filter((column) => !positions.includes(column) && !normals?.includes(column));
@@ -54,44 +60,31 @@ function latin(bytes) {
   return new TextDecoder("latin1").decode(bytes);
 }
 
-// Text tables.
-
-function table(text) {
-  const lines = text.split(/\r?\n/).filter((line) => line.trim() && !/^\s*(#|\/\/)/.test(line));
-  const cells = (line) => line.trim().split(/\s*[,;\t]\s*|\s+/);
-  const isNumeric = (row) => row.every((cell) => cell !== "" && Number.isFinite(Number(cell)));
-  const first = cells(lines[0] ?? "").map((cell) => cell.replace(/^"(.*)"$/, "$1"));
-  const hasHeader = !isNumeric(first);
-  // A file of XYZ format may begin with the number of its points.
-  const hasCount = first.length === 1 && !hasHeader;
-  const rows = lines.slice(hasHeader || hasCount ? 1 : 0).map(cells);
-  const width = rows[0]?.length ?? 0;
-  const wrong = rows.findIndex((row) => row.length !== width || !isNumeric(row));
-  if (width === 0 || wrong >= 0) {
-    throw new Error(`line ${wrong + (hasHeader || hasCount ? 2 : 1)} is not a row of ${width || "two or three"} numbers`);
-  }
-  // Six numbers may be a position with a colour.
-  const isUnit = (row) => Math.abs(Math.hypot(...row.slice(3, 6).map(Number)) - 1) < 0.1;
-  const hasNormals = width === 6 && rows.every(isUnit);
-  const names = hasHeader ? first : ["x", "y", "z"].slice(0, width).concat(hasNormals ? ["nx", "ny", "nz"] : []);
-  const columns = Array.from({ length: width }, () => new Float64Array(rows.length));
-  rows.forEach((row, at) => row.forEach((cell, column) => (columns[column][at] = Number(cell))));
-  return new Map(columns.map((column, at) => [names[at] ?? `column ${at + 1}`, column]));
-}
+// JSON.
 
 function ofJson(document, name) {
   const { points, normals, values } = document.cloud ?? (Array.isArray(document) ? { points: document } : document);
-  if (!Array.isArray(points) || points.length === 0 || ![2, 3].includes(points[0]?.length)) {
-    throw new Error("the JSON needs points: rows of two or three coordinates");
-  }
-  const columns = (rows) => rows[0].map((_, axis) => Float64Array.from(rows, (row) => row[axis]));
+  const d = points?.[0]?.length;
+  if (!Array.isArray(points) || ![2, 3].includes(d)) throw new Error("the JSON needs points: rows of two or three coordinates");
   const given = values ?? document.values;
   return {
     name,
-    points: interleaved(columns(points)),
-    normals: normals && interleaved(columns(normals)),
-    values: new Map(given ? [["values", Float64Array.from(given)]] : []),
+    points: rowsOfJson("points", points, [points.length, d]),
+    normals: normals && rowsOfJson("normals", normals, [points.length, d]),
+    values: new Map(given ? [["values", Float64Array.from(numbersOfJson("values", given, points.length))]] : []),
   };
+}
+
+function rowsOfJson(member, rows, [n, d]) {
+  if (!Array.isArray(rows) || rows.length !== n) throw new Error(`${member} are to have a row for each of the ${n} points`);
+  const data = rows.flatMap((row, at) => numbersOfJson(`${member}[${at}]`, row, d));
+  return new Tensor(Float64Array.from(data), [n, d]);
+}
+
+function numbersOfJson(member, numbers, n) {
+  const isRow = Array.isArray(numbers) && numbers.length === n && numbers.every(Number.isFinite);
+  if (!isRow) throw new Error(`${member} is not a row of ${n} numbers`);
+  return numbers;
 }
 
 // Binary tables.
@@ -120,13 +113,41 @@ function rowsOf(bytes, start, n, fields, isLittle) {
   return columns;
 }
 
-function textRows(text, n, names) {
-  const numbers = text.trim().split(/\s+/).map(Number);
-  if (numbers.length < n * names.length) throw new Error(`the file ends before its ${n} points do`);
-  return new Map(names.map((name, column) => {
-    return [name, Float64Array.from({ length: n }, (_, row) => numbers[row * names.length + column])];
-  }));
+/** Rows of numbers, one a line, that begin at a byte of the file. */
+function textRows(bytes, start, n, names) {
+  const columns = names.map(() => new Float64Array(n));
+  let line = latin(bytes.subarray(0, start)).split("\n").length - 1;
+  let row = 0;
+  for (const text of latin(bytes.subarray(start)).split("\n")) {
+    if (row === n) break;
+    line++;
+    const words = text.split(/[ \t\r]+/).filter(Boolean);
+    if (words.length === 0) continue;
+    if (words.length !== names.length) {
+      throw new Error(`line ${line} has ${words.length} numbers, but the header announces ${names.length}`);
+    }
+    words.forEach((word, column) => (columns[column][row] = numberOfRow(word, line)));
+    row++;
+  }
+  if (row < n) throw new Error(`the file ends before its ${n} points do`);
+  return new Map(columns.map((column, at) => [names[at], column]));
 }
+
+/** A number or, as scanners write what they have not measured, NaN or an infinity. */
+function numberOfRow(word, line) {
+  const value = numberOf(word) ?? (/^[+-]?inf(inity)?$/i.test(word) ? NaN : undefined);
+  if (value === undefined) throw new Error(`line ${line}: "${word.slice(0, 40)}" is no number`);
+  return value;
+}
+
+/** A number of rows in a header. */
+function wholeOf(word) {
+  if (!/^\d+$/.test(word ?? "")) throw new Error("the header has no number of points");
+  return Number(word);
+}
+
+/** Whether binary numbers of PLY begin with their lowest byte, by the name of the format. */
+const IS_LITTLE = { binary_little_endian: true, binary_big_endian: false };
 
 function ply(bytes) {
   const start = latin(bytes.subarray(0, 1 << 16));
@@ -139,17 +160,15 @@ function ply(bytes) {
   if (at < 0 || lines.slice(0, at).some(([word]) => word === "element")) {
     throw new Error("the first element of a PLY file is to be its vertices");
   }
-  const n = Number(lines[at][2]);
+  const n = wholeOf(lines[at][2]);
   const last = lines.findIndex(([word], line) => line > at && word === "element");
   const fields = lines.slice(at + 1, last < 0 ? undefined : last)
     .filter(([word]) => word === "property")
     .map(([, type, name]) => ({ type, name }));
-  if (fields.some(({ type }) => !(type in TYPES))) throw new Error("a vertex of the PLY file has a list");
-  if (format === "ascii") {
-    const rows = latin(bytes.subarray(body)).split("\n", n).join("\n");
-    return textRows(rows, n, fields.map(({ name }) => name));
-  }
-  return rowsOf(bytes, body, n, fields, format === "binary_little_endian");
+  if (fields.some(({ type }) => !Object.hasOwn(TYPES, type))) throw new Error("a vertex of the PLY file has a list");
+  if (format === "ascii") return textRows(bytes, body, n, fields.map(({ name }) => name));
+  if (!Object.hasOwn(IS_LITTLE, format)) throw new Error(`the PLY file has the unknown format ${format}`);
+  return rowsOf(bytes, body, n, fields, IS_LITTLE[format]);
 }
 
 const PCD_TYPES = { F4: "float", F8: "double", I1: "char", I2: "short", I4: "int", U1: "uchar", U2: "ushort", U4: "uint" };
@@ -158,22 +177,27 @@ function pcd(bytes) {
   const start = latin(bytes.subarray(0, 4096));
   const entry = (word) => start.match(new RegExp(`^${word} (.*)$`, "m"))?.[1].trim().split(/\s+/) ?? [];
   const [names, sizes, types, counts] = ["FIELDS", "SIZE", "TYPE", "COUNT"].map(entry);
-  const n = Number(entry("POINTS")[0]);
+  const n = wholeOf(entry("POINTS")[0]);
   const [encoding] = entry("DATA");
   const body = start.indexOf("\n", start.search(/^DATA /m)) + 1;
   if (counts.some((count) => count !== "1")) throw new Error("fields of the PCD file have several numbers");
-  if (encoding === "ascii") return withoutGaps(textRows(latin(bytes.subarray(body)), n, names));
+  if (encoding === "ascii") return textRows(bytes, body, n, names);
   if (encoding !== "binary") throw new Error(`PCD files in ${encoding} are not read, ascii and binary are`);
   const fields = names.map((name, at) => ({ name, type: PCD_TYPES[types[at] + sizes[at]] }));
-  return withoutGaps(rowsOf(bytes, body, n, fields, true));
+  const unknown = fields.find(({ type }) => type === undefined);
+  if (unknown) throw new Error(`the type of ${unknown.name} in the PCD file is unknown`);
+  return rowsOf(bytes, body, n, fields, true);
 }
 
-/** Organised scans have NaN where nothing was measured. */
+/** Columns without the rows of organised scans where nothing was measured, which have NaN, and the number of those. */
 function withoutGaps(columns) {
-  const [x] = columns.values();
-  const kept = Array.from(x.keys()).filter((row) => Number.isFinite(x[row]));
-  if (kept.length === x.length) return columns;
-  return new Map([...columns].map(([name, column]) => [name, Float64Array.from(kept, (row) => column[row])]));
+  const positions = POSITIONS.map((axis) => columns.get(axis)).filter(Boolean);
+  const rows = Array.from(columns.values().next().value?.keys() ?? []);
+  const kept = rows.filter((row) => positions.every((column) => Number.isFinite(column[row])));
+  const nLeftOut = rows.length - kept.length;
+  if (nLeftOut === 0) return { columns, nLeftOut };
+  const known = [...columns].map(([name, column]) => [name, Float64Array.from(kept, (row) => column[row])]);
+  return { columns: new Map(known), nLeftOut };
 }
 
 function npy(bytes) {
@@ -185,6 +209,7 @@ function npy(bytes) {
   if (!shape || !type || /'fortran_order': True/.test(header)) {
     throw new Error("an npy file is to hold float32 or float64 of shape [n, d], row by row");
   }
-  const fields = Array.from({ length: shape[1] }, (_, at) => ({ name: ["x", "y", "z"][at] ?? `column ${at + 1}`, type }));
-  return rowsOf(bytes, body, shape[0], fields, true);
+  const [n, d] = shape;
+  if (d !== 2 && d !== 3) throw new Error(`the npy file holds points in ${d} dimensions, and the page shows 2 or 3`);
+  return rowsOf(bytes, body, n, POSITIONS.slice(0, d).map((name) => ({ name, type })), true);
 }

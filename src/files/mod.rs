@@ -128,9 +128,7 @@ fn cloud_in(path: &Path) -> Result<(&'static str, Bytes), Failure> {
         "json" => Ok((JSON, bytes)),
         _ => {
             let refused = |detail| Failure::File(format!("{}: {detail}", path.display()));
-            let text = std::str::from_utf8(&bytes).map_err(|_| refused("not a text".to_owned()))?;
-            let tensors = table::tensors_of(text).map_err(refused)?;
-            Ok(("application/x-safetensors", tensors.into()))
+            Ok(("application/x-safetensors", table::tensors_of(&bytes).map_err(refused)?.into()))
         }
     }
 }

@@ -113,3 +113,19 @@ fn scripts_can_tell_what_went_wrong() {
         assert!(!folder.0.join("out.ply").exists());
     }
 }
+
+#[test]
+fn tables_with_decimal_commas_are_read_and_others_name_their_line() {
+    let folder = Folder::new("tables");
+    folder.write("commas.csv", &sphere(100).replace('.', ",").replace(' ', ";"));
+    folder.write("points.csv", &sphere(100).replace(' ', ";"));
+    for name in ["commas", "points"] {
+        let ended = folder.run(&["normals", &format!("{name}.csv"), "-o", &format!("{name}.ply")]);
+        assert_eq!(code(&ended), Some(0), "{}", String::from_utf8_lossy(&ended.stderr));
+    }
+    assert_eq!(folder.read("commas.ply"), folder.read("points.ply"));
+    folder.write("shifted.csv", "x,y,z,q\n1,,3,4\n");
+    let ended = folder.run(&["normals", "shifted.csv", "-o", "out.ply"]);
+    let told = String::from_utf8_lossy(&ended.stderr);
+    assert!(code(&ended) == Some(1) && told.contains("shifted.csv: line 2: cell 2 is empty"), "{told}");
+}

@@ -7,6 +7,8 @@ import { mkdirSync, readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { after, before, test } from "node:test";
 
+import { asked, HOSTILE } from "./running.mjs";
+
 const require = createRequire(`${process.cwd()}/target/sdk/node_modules/`);
 const { chromium } = require("playwright-core");
 const axe = readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
@@ -187,6 +189,31 @@ test("a mesh and a picture are saved", () =>
       const bytes = readFileSync(await saved.path());
       assert.equal(bytes.subarray(0, start.length).toString("latin1"), start);
     }
+  }));
+
+test("a hostile link and a hostile file put nothing into the snippets", () => {
+  const [text] = HOSTILE;
+  const link = new URLSearchParams({ example: "ball", solver: text, surface: text, family: text, operation: text, duplicates: text });
+  return opened(`#${link}`, async (page) => {
+    await settled(page);
+    for (const name of ["solver", "surface", "family"]) assert.equal(await page.inputValue(`[name=${name}]`), "auto");
+    await open(page, `${text}.ply`, `ply\nformat ascii 1.0\nelement vertex 300\n${["x", "y", "z"].map((axis) => `property float ${axis}\n`).join("")}end_header\n${sphere(300)}\n`);
+    for (const [title, language] of [["curl", "curl"], ["Python", "python"], ["TypeScript", "typescript"]]) {
+      await page.click(`#languages button:text-is("${title}")`);
+      const found = asked(language, await page.textContent("#code"));
+      if (language === "python") assert.deepEqual(found[1], ["cloud", `${text}.ply`]);
+      else assert.equal(found[0][0], `${base}v1/curvatures`);
+    }
+  });
+});
+
+test("a table that can be read in two ways is refused with its line", () =>
+  opened("#example=ball", async (page) => {
+    await settled(page);
+    const rows = "7,85081,-8,24886,39,98910\n8,1,2,3,4,5\n";
+    await page.setInputFiles("#file", { name: "torn.csv", mimeType: "text/plain", buffer: Buffer.from(rows) });
+    await page.waitForSelector("#refusal:visible");
+    assert.match(await page.textContent("#refusal"), /line 1: commas may be decimal marks here/);
   }));
 
 for (const [name, viewport, colorScheme] of [["desk", DESK, "light"], ["phone", PHONE, "light"], ["dark", DESK, "dark"]]) {

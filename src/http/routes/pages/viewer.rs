@@ -44,7 +44,7 @@ macro_rules! files {
 
 const INDEX: &str = "index.html";
 
-static FILES: [File; 21] = files![
+static FILES: [File; 22] = files![
     "index.html" HTML,
     "style.css" STYLE,
     "icon.svg" PICTURE,
@@ -57,6 +57,7 @@ static FILES: [File; 21] = files![
     "model/service.js" SCRIPT,
     "model/snippets.js" SCRIPT,
     "model/state.js" SCRIPT,
+    "model/tables.js" SCRIPT,
     "model/tensors.js" SCRIPT,
     "view/colours.js" SCRIPT,
     "view/histogram.js" SCRIPT,
