@@ -17,4 +17,5 @@ pub mod files;
 mod machine;
 mod memory;
 pub mod server;
+pub mod signals;
 pub mod telemetry;

@@ -9,9 +9,9 @@ use gramian::files::{self, FileCommand};
 use gramian::http::access;
 use gramian::http::serve::durable;
 use gramian::http::state::app::App;
+use gramian::signals::Signals;
 use gramian::{server, telemetry};
 use tokio::net::TcpListener;
-use tokio::signal::unix::{Signal, SignalKind, signal};
 
 /// Exit status after a second signal during shutdown: 128 plus the number of SIGINT, as shells report it.
 const INTERRUPTED: i32 = 130;
@@ -111,23 +111,4 @@ async fn serve(config: Config) -> Result<(), Box<dyn std::error::Error>> {
     tokio::spawn(app.keys.clone().follow_file());
     server::serve(app, listener, stop).await?;
     Ok(())
-}
-
-/// Signals that tell the process to end.
-struct Signals {
-    terminate: Signal,
-    interrupt: Signal,
-}
-
-impl Signals {
-    fn new() -> std::io::Result<Self> {
-        Ok(Self { terminate: signal(SignalKind::terminate())?, interrupt: signal(SignalKind::interrupt())? })
-    }
-
-    async fn next(&mut self) {
-        tokio::select! {
-            _ = self.terminate.recv() => {}
-            _ = self.interrupt.recv() => {}
-        }
-    }
 }

@@ -1,11 +1,11 @@
 //! Subcommands that answer files without a server. They send the request through the same router, in this
 //! process and without a port, so that answers and refusals are those of the service.
 
+mod output;
 mod progress;
 mod router;
 mod table;
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -13,6 +13,8 @@ use axum::body::Bytes;
 use serde_json::{Map, Value, json};
 
 use crate::config::Config;
+use crate::signals::Signals;
+use output::Output;
 use router::{Answerer, Failure};
 
 const JSON: &str = "application/json";
@@ -67,18 +69,34 @@ pub struct OfCloud {
 
 /// Answers a subcommand.
 ///
-/// The exit code is 0 for an answer, 1 if a file cannot be read or written, 3 if the request was refused,
-/// and 4 if it failed. (2 is for wrong arguments.)
+/// The exit code is 0 for an answer, 1 if a file cannot be read or written, 2 for wrong arguments, 3 if the
+/// request was refused, and 4 if it failed. After a signal it is 128 and the signal's number.
 pub fn run(command: FileCommand, config: Config) -> ExitCode {
     let answered = tokio::runtime::Runtime::new()
         .map_err(|error| Failure::File(format!("the runtime does not start: {error}")))
-        .and_then(|runtime| runtime.block_on(answer(command, config)));
+        .and_then(|runtime| {
+            let answered = runtime.block_on(answer_until_told_to_end(command, config));
+            // Computations and writes that a signal has ended are not awaited.
+            runtime.shutdown_background();
+            answered
+        });
     match answered {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             eprintln!("gramian: {failure}");
             ExitCode::from(failure.exit_code())
         }
+    }
+}
+
+/// Answers a subcommand. A signal drops what is under way, and the file beside the output with it.
+async fn answer_until_told_to_end(command: FileCommand, config: Config) -> Result<(), Failure> {
+    let signals = Signals::new();
+    let mut signals =
+        signals.map_err(|error| Failure::File(format!("signals cannot be received: {error}")))?;
+    tokio::select! {
+        answered = answer(command, config) => answered,
+        signal = signals.next() => Err(Failure::Ended(signal)),
     }
 }
 
@@ -89,10 +107,10 @@ async fn answer(command: FileCommand, config: Config) -> Result<(), Failure> {
         FileCommand::Mesh(of) => of_cloud("level-set", &of, config).await,
         FileCommand::Ask { operation, request, output } => {
             let accept = output.as_deref().map_or(Ok(JSON), media_type_of)?;
-            let body = read(&request)?;
+            let output = Output::prepare(output.as_deref(), &request)?;
+            let body = on_thread(move || read(&request)).await?;
             let answerer = Answerer::start(config).await?;
-            let found = answerer.compute(&format!("/v1/{operation}"), body, accept).await?;
-            write(output.as_deref(), &found)
+            output.write(answerer.compute(&format!("/v1/{operation}"), body, accept).await?).await
         }
     }
 }
@@ -111,12 +129,22 @@ async fn of_cloud(operation: &str, of: &OfCloud, config: Config) -> Result<(), F
             include.push(json!("deviations"));
         }
     }
-    let (media_type, body) = cloud_in(&of.cloud)?;
+    let output = Output::prepare(Some(&of.output), &of.cloud)?;
+    let cloud = of.cloud.clone();
+    let (media_type, body) = on_thread(move || cloud_in(&cloud)).await?;
     let answerer = Answerer::start(config).await?;
     let cloud = answerer.register(media_type, body).await?;
     request.insert("cloud".to_owned(), json!({"id": cloud}));
     let body = Bytes::from(Value::Object(request).to_string());
-    write(Some(&of.output), &answerer.compute(&format!("/v1/{operation}"), body, accept).await?)
+    output.write(answerer.compute(&format!("/v1/{operation}"), body, accept).await?).await
+}
+
+/// Works with files on a thread of its own, so that signals are heard while a pipe has nothing to say.
+async fn on_thread<T: Send + 'static>(
+    work: impl FnOnce() -> Result<T, Failure> + Send + 'static,
+) -> Result<T, Failure> {
+    let done = tokio::task::spawn_blocking(work).await;
+    done.map_err(|error| Failure::File(format!("a thread broke off: {error}")))?
 }
 
 /// The media type and the bytes of a cloud in a file.
@@ -149,17 +177,4 @@ fn media_type_of(path: &Path) -> Result<&'static str, Failure> {
 fn read(path: &Path) -> Result<Bytes, Failure> {
     let found = std::fs::read(path);
     found.map(Bytes::from).map_err(|error| Failure::File(format!("{}: {error}", path.display())))
-}
-
-fn write(path: Option<&Path>, bytes: &[u8]) -> Result<(), Failure> {
-    match path {
-        Some(path) => {
-            std::fs::write(path, bytes).map_err(|error| Failure::File(format!("{}: {error}", path.display())))
-        }
-        None => {
-            let mut out = std::io::stdout().lock();
-            let written = out.write_all(bytes).and_then(|()| out.write_all(b"\n"));
-            written.map_err(|error| Failure::File(format!("standard output: {error}")))
-        }
-    }
 }

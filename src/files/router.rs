@@ -8,6 +8,7 @@ use axum::body::{Body, Bytes, to_bytes};
 use axum::http::{HeaderName, Method, Request, StatusCode, header};
 use axum::response::Response;
 use serde_json::Value;
+use tokio::signal::unix::SignalKind;
 use tower::ServiceExt;
 
 use super::JSON;
@@ -26,6 +27,8 @@ pub enum Failure {
     Argument(String),
     /// A file cannot be read or written.
     File(String),
+    /// A signal told the process to end.
+    Ended(SignalKind),
     /// The service refused the request, or failed, with the problem document.
     Problem(StatusCode, Value),
 }
@@ -35,6 +38,8 @@ impl Failure {
         match self {
             Self::File(_) => 1,
             Self::Argument(_) => 2,
+            // As shells report it.
+            Self::Ended(signal) => 128 + signal.as_raw_value() as u8,
             Self::Problem(status, _) if status.is_client_error() => 3,
             Self::Problem(..) => 4,
         }
@@ -45,6 +50,7 @@ impl fmt::Display for Failure {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Argument(detail) | Self::File(detail) => formatter.write_str(detail),
+            Self::Ended(signal) => write!(formatter, "ended by signal {}", signal.as_raw_value()),
             Self::Problem(status, problem) => {
                 let text = |member: &str| problem[member].as_str().unwrap_or_default();
                 let place = problem["errors"][0]["pointer"].as_str().map(|at| format!(" (at {at})"));

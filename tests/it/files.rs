@@ -1,10 +1,14 @@
 //! Subcommands that answer files without a server.
 
+use std::fs::{self, Permissions};
+use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::PathBuf;
 use std::process::{Command, Output};
 
 use serde_json::{Value, json};
 
+use crate::limits::slow_request;
+use crate::process::gramian;
 use crate::support::fibonacci_sphere;
 
 /// A folder that is removed with its files.
@@ -27,11 +31,16 @@ impl Folder {
 
     /// Runs the binary in the folder, without the settings of this process.
     fn run(&self, arguments: &[&str]) -> Output {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_gramian"));
-        for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("GRAMIAN_")) {
-            command.env_remove(name);
-        }
-        command.current_dir(&self.0).args(arguments).output().unwrap()
+        gramian().current_dir(&self.0).args(arguments).output().unwrap()
+    }
+
+    /// The names of all files, in order.
+    fn names(&self) -> Vec<String> {
+        let files = fs::read_dir(&self.0).unwrap();
+        let mut names: Vec<String> =
+            files.map(|file| file.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
     }
 }
 
@@ -112,6 +121,122 @@ fn scripts_can_tell_what_went_wrong() {
         assert!(told.contains(part), "{arguments:?}: {told}");
         assert!(!folder.0.join("out.ply").exists());
     }
+}
+
+#[test]
+fn an_answer_never_replaces_the_file_that_is_read() {
+    let folder = Folder::new("same");
+    folder.write("scan.ply", "ply\nthis is a scan\n");
+    symlink("scan.ply", folder.0.join("link.ply")).unwrap();
+    fs::hard_link(folder.0.join("scan.ply"), folder.0.join("hard.ply")).unwrap();
+    for output in ["scan.ply", "./scan.ply", "link.ply", "hard.ply"] {
+        let ended = folder.run(&["normals", "scan.ply", "-o", output]);
+        let told = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(code(&ended), Some(2), "{output}: {told}");
+        assert!(
+            told.contains(&format!("{output}: the answer would replace the file that is read")),
+            "{told}"
+        );
+    }
+    folder.write("request.json", "{}");
+    assert_eq!(code(&folder.run(&["ask", "normals", "request.json", "-o", "request.json"])), Some(2));
+    assert_eq!(folder.read("scan.ply"), b"ply\nthis is a scan\n");
+    assert_eq!(folder.names(), ["hard.ply", "link.ply", "request.json", "scan.ply"]);
+}
+
+#[test]
+fn what_cannot_be_written_is_told_before_anything_is_read() {
+    let folder = Folder::new("unwritable");
+    fs::create_dir(folder.0.join("folder.ply")).unwrap();
+    symlink("loop.ply", folder.0.join("loop.ply")).unwrap();
+    for (output, part) in [
+        ("no/such/out.ply", "no/such/out.ply: nothing can be written in its folder"),
+        ("folder.ply", "folder.ply: is a directory"),
+        ("loop.ply", "loop.ply"),
+        ("/proc/out.ply", "/proc/out.ply"),
+    ] {
+        let ended = folder.run(&["normals", "absent.ply", "-o", output]);
+        let told = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(code(&ended), Some(1), "{output}: {told}");
+        assert!(told.contains(part) && !told.contains("absent.ply"), "{told}");
+    }
+}
+
+#[test]
+fn a_full_disk_leaves_an_older_file_as_it_was() {
+    let folder = Folder::new("full");
+    folder.write("scan.xyz", &sphere(300));
+    folder.write("out.ply", "older");
+    // No file may grow beyond 1 KiB, and the signal that tells so is ignored: writes fail.
+    let line = format!("ulimit -f 1; trap '' XFSZ; exec {} \"$@\"", env!("CARGO_BIN_EXE_gramian"));
+    let mut command = Command::new("bash");
+    command.args(["-c", &line, "bash", "normals", "scan.xyz", "-o", "out.ply"]);
+    let ended = command.current_dir(&folder.0).output().unwrap();
+    let told = String::from_utf8_lossy(&ended.stderr);
+    assert_eq!(code(&ended), Some(1), "{told}");
+    assert!(told.contains("out.ply: File too large"), "{told}");
+    assert_eq!(folder.read("out.ply"), b"older");
+    assert_eq!(folder.names(), ["out.ply", "scan.xyz"]);
+}
+
+#[test]
+fn an_interrupt_leaves_an_older_file_as_it_was() {
+    for (signal, expected) in [("-INT", 130), ("-TERM", 143)] {
+        let folder = Folder::new(&format!("interrupt{signal}"));
+        folder.write("request.json", &slow_request().to_string());
+        folder.write("out.json", "older");
+        let mut command = gramian();
+        let arguments = ["ask", "curvatures", "request.json", "-o", "out.json"];
+        let mut child = command.current_dir(&folder.0).args(arguments).spawn().unwrap();
+        // The file beside the output is there before the work begins.
+        while folder.names().len() < 3 {
+            assert!(child.try_wait().unwrap().is_none(), "{:?}", folder.names());
+            std::thread::yield_now();
+        }
+        let pid = child.id().to_string();
+        assert!(Command::new("kill").args([signal, &pid]).status().unwrap().success());
+        assert_eq!(child.wait().unwrap().code(), Some(expected));
+        assert_eq!(folder.read("out.json"), b"older");
+        assert_eq!(folder.names(), ["out.json", "request.json"]);
+    }
+}
+
+#[test]
+fn a_replaced_file_keeps_its_permissions_and_its_links() {
+    let folder = Folder::new("permissions");
+    folder.write("scan.xyz", &sphere(100));
+    folder.write("older.ply", "older");
+    let older = folder.0.join("older.ply");
+    fs::set_permissions(&older, Permissions::from_mode(0o640)).unwrap();
+    fs::create_dir(folder.0.join("links")).unwrap();
+    symlink("../older.ply", folder.0.join("links/out.ply")).unwrap();
+    symlink("new.ply", folder.0.join("dangling.ply")).unwrap();
+    for output in ["links/out.ply", "dangling.ply"] {
+        assert_eq!(code(&folder.run(&["normals", "scan.xyz", "-o", output])), Some(0));
+        assert!(folder.0.join(output).is_symlink());
+    }
+    assert!(folder.read("older.ply").starts_with(b"ply") && folder.read("new.ply").starts_with(b"ply"));
+    let mode = |name: &str| fs::metadata(folder.0.join(name)).unwrap().permissions().mode() & 0o777;
+    folder.write("other.ply", "as new files are");
+    assert_eq!((mode("older.ply"), mode("new.ply")), (0o640, mode("other.ply")));
+}
+
+#[test]
+fn pipes_take_answers_as_they_come() {
+    let folder = Folder::new("pipe");
+    folder.write("scan.xyz", &sphere(100));
+    let pipe = folder.0.join("out.ply");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let mut command = gramian();
+    command.current_dir(&folder.0).args(["normals", "scan.xyz", "-o", "out.ply"]);
+    let mut child = command.spawn().unwrap();
+    assert!(fs::read(&pipe).unwrap().starts_with(b"ply"));
+    assert!(child.wait().unwrap().success());
+    // A link to standard output stands for it.
+    symlink("/dev/stdout", folder.0.join("standard.ply")).unwrap();
+    let ended = folder.run(&["normals", "scan.xyz", "-o", "standard.ply"]);
+    assert!(ended.stdout.starts_with(b"ply"), "{}", String::from_utf8_lossy(&ended.stderr));
+    assert_eq!(folder.names(), ["out.ply", "scan.xyz", "standard.ply"]);
 }
 
 #[test]
