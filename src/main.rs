@@ -103,9 +103,9 @@ async fn serve(config: Config) -> Result<(), Box<dyn std::error::Error>> {
             std::process::exit(INTERRUPTED);
         });
     };
-    let (address, n_api_keys) = (listener.local_addr()?, config.api_keys.len());
-    tracing::info!(%address, threads = config.n_threads(), n_api_keys, "listening");
     let app = App::new(config).await?;
+    let (address, n_api_keys) = (listener.local_addr()?, app.keys.n_keys());
+    tracing::info!(%address, threads = app.config.n_threads(), n_api_keys, "listening");
     tokio::spawn(durable::catch_up(app.clone()));
     tokio::spawn(durable::retain(app.clone()));
     tokio::spawn(app.keys.clone().follow_file());

@@ -42,6 +42,22 @@ async fn the_log_names_requests_and_never_shows_what_they_carry() {
 }
 
 #[test]
+fn the_log_counts_the_keys_of_a_file_too() {
+    let file = std::env::temp_dir().join(format!("gramian-log-keys-{}.toml", std::process::id()));
+    let made = ["one", "two"].map(|name| gramian().args(["key", name]).output().unwrap().stdout);
+    std::fs::write(&file, made.concat()).unwrap();
+    for (keys, n_keys) in [(None, 2), (Some("three"), 3)] {
+        let mut command = gramian();
+        command.args(["--bind", "127.0.0.1:0"]).env("GRAMIAN_KEYS_FILE", &file);
+        command.envs(keys.map(|keys| ("GRAMIAN_API_KEYS", keys)));
+        let process = Process::of(&mut command);
+        process.terminate();
+        assert_eq!(logged(&process.finish().1, "listening")["n_api_keys"], n_keys);
+    }
+    std::fs::remove_file(file).unwrap();
+}
+
+#[test]
 fn the_log_counts_keys_and_names_unknown_settings() {
     for (keys, n_keys) in [(None, 0), (Some("one,two"), 2)] {
         let mut command = gramian();

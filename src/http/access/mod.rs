@@ -109,6 +109,11 @@ impl Keys {
         self.configured.is_empty() && self.file.is_none()
     }
 
+    /// Number of current keys, of the configuration and of the file.
+    pub fn n_keys(&self) -> usize {
+        self.callers.load().len()
+    }
+
     /// Returns all owners since the start of the process.
     pub fn owners(&self) -> Vec<Owner> {
         (0..self.views().len()).map(Owner).collect()
@@ -159,7 +164,7 @@ impl Keys {
             match found {
                 Ok((file, _)) => {
                     self.replace_keys(&file);
-                    tracing::info!(n_keys = self.callers.load().len(), "keys were read again");
+                    tracing::info!(n_keys = self.n_keys(), "keys were read again");
                 }
                 Err(error) => tracing::error!(
                     error,
