@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import errno
 import os
 import pickle
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -16,6 +18,7 @@ from sent import CIRCLE, METHODS, OPERATORS, QUERYING, VALUES
 import gramian
 from gramian import Geometry, Kernel
 from gramian.answers import Answer
+from gramian.answers.files import replace_file
 from gramian.answers.fit import operator_fit_used, surface_fit_used
 from gramian.rest.types import UNSET, Unset
 from gramian.wire.tensors import Members
@@ -248,3 +251,23 @@ def test_representations_are_as_one_writes_them(cloud: Any) -> None:
         cloud.normals(alpha=-1)
     assert "unset" not in repr(caught.value).lower()
     assert repr(Unset()) == "UNSET"  # on its own it is shown
+
+
+def test_a_full_disk_leaves_an_older_file_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    older = tmp_path / "mesh.ply"
+    older.write_bytes(b"older")
+    older.chmod(0o640)
+    link = tmp_path / "link.ply"
+    link.symlink_to("mesh.ply")
+
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)
+        with pytest.raises(OSError, match="No space left"):
+            replace_file(link, b"newer")
+    assert older.read_bytes() == b"older"
+    replace_file(link, b"newer")
+    assert (link.is_symlink(), older.read_bytes(), older.stat().st_mode & 0o777) == (True, b"newer", 0o640)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["link.ply", "mesh.ply"]

@@ -13,6 +13,7 @@ from ..arguments.options import SurfaceFit
 from ..rest.models import Diagnostics, MeshPart
 from ..wire.tensors import Array, Integers, Members
 from .answer import Answer, numbers_of
+from .files import replace_file
 from .fit import surface_fit_used, values_fit_used
 
 if TYPE_CHECKING:
@@ -114,6 +115,8 @@ class Mesh(Answer):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the triangles to a file: `.ply` with all that is known of the vertices, `.glb` or `.obj`.
 
+        An older file is replaced once the new one is whole.
+
         Raises
         ------
         ModuleNotFoundError, ValueError
@@ -122,7 +125,8 @@ class Mesh(Answer):
         name = os.fspath(path)
         if not name.lower().endswith((".ply", ".glb", ".obj")):
             raise ValueError(f"the name of a mesh ends with .ply, .glb or .obj, not as {name!r} does")
-        self.to_trimesh().export(name)
+        written = self.to_trimesh().export(file_type=name.lower().rpartition(".")[2])
+        replace_file(path, written.encode() if isinstance(written, str) else written)
 
     def plot(
         self,
