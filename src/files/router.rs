@@ -38,7 +38,7 @@ impl Failure {
         match self {
             Self::File(_) => 1,
             Self::Argument(_) => 2,
-            // As shells report it.
+            // Shells report 128 plus the number of the signal.
             Self::Ended(signal) => 128 + signal.as_raw_value() as u8,
             Self::Problem(status, _) if status.is_client_error() => 3,
             Self::Problem(..) => 4,

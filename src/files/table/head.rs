@@ -13,7 +13,7 @@ pub struct Line<'a> {
     pub text: &'a str,
 }
 
-/// What separates the cells of every line.
+/// Separator of the cells of every line.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Separator {
     Semicolons,

@@ -75,7 +75,7 @@ pub struct Place {
     pub may_miss: bool,
 }
 
-/// What was seen of the decimal marks of a file.
+/// Decimal marks seen in a file.
 #[derive(Default)]
 pub struct Numbers {
     has_point: bool,

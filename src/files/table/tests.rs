@@ -33,7 +33,7 @@ fn outcome_of(name: &str) -> Value {
     outcome
 }
 
-/// Whole numbers as floats, as which they are read.
+/// Whole numbers, parsed as floats.
 fn as_floats(value: &Value) -> Value {
     match value {
         Value::Array(entries) => entries.iter().map(as_floats).collect(),
