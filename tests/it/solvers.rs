@@ -225,6 +225,76 @@ async fn beyond_what_is_factorized_auto_takes_landmarks_where_few_are_enough_and
 }
 
 #[tokio::test]
+async fn auto_takes_landmarks_where_they_are_faster_than_all_points_and_have_their_digits() {
+    let server = Server::start().await;
+    for (n, kernel, alpha, expected) in [
+        (1500, smooth(), Some(1e-4), "landmark"),
+        (1500, smooth(), Some(1e-8), "dense"),
+        (1500, smooth(), None, "dense"),
+        (1500, rough(), Some(1e-4), "dense"),
+        (999, smooth(), Some(1e-4), "dense"),
+    ] {
+        let points = fibonacci_sphere(n);
+        let values: Vec<f64> = points.iter().map(|x| (2.0 * x[0]).sin() + x[1] * x[2]).collect();
+        let mut body = json!({"cloud": {"points": points}, "values": values, "kernel": kernel,
+            "queries": [[0.6, 0.8, 0.0], [0.0, 0.0, 0.9]], "include": ["variance"]});
+        if let Some(alpha) = alpha {
+            body["alpha"] = json!(alpha);
+        }
+        let answer = server.post("/v1/posterior", &body).await.expect_ok();
+        let diagnostics = &answer["diagnostics"];
+        assert_eq!(diagnostics["solver"], expected, "n = {n}, {kernel}, {alpha:?}: {diagnostics}");
+        if expected == "dense" {
+            continue;
+        }
+        assert!(diagnostics["solver_reason"].as_str().unwrap().contains("few landmarks"), "{diagnostics}");
+        // By its id, the cloud has the same factor.
+        let mut again = body.clone();
+        again["cloud"] = json!({"id": diagnostics["cloud_id"]});
+        assert_eq!(server.post("/v1/posterior", &again).await.expect_ok()["means"], answer["means"]);
+        body["solver"] = json!("dense");
+        let dense = server.post("/v1/posterior", &body).await.expect_ok();
+        check_near(&answer["means"], &dense["means"], 1e-10);
+        check_near(&answer["variances"], &dense["variances"], 1e-6);
+    }
+}
+
+#[tokio::test]
+async fn points_of_a_request_that_is_probed_are_refused_at_their_place() {
+    let server = Server::start().await;
+    let mut points: Vec<Vec<f64>> = fibonacci_sphere(1500).iter().map(|x| x.to_vec()).collect();
+    let body = |points: &[Vec<f64>], kernel: Value| {
+        json!({"cloud": {"points": points}, "values": vec![1.0; points.len()], "kernel": kernel, "alpha": 1e-4,
+            "queries": [[0.6, 0.8]]})
+    };
+    // The probe has registered the points, and the queries have another dimension.
+    let refused = server.post("/v1/interpolation", &body(&points, smooth())).await;
+    assert_eq!(refused.expect_problem(422, "dimension-mismatch")["errors"][0]["pointer"], "/queries");
+    let wrong = json!({"family": "gauss", "length_scale": -1.0});
+    let refused = server.post("/v1/interpolation", &body(&points, wrong)).await;
+    let problem = refused.expect_problem(422, "invalid-request");
+    assert_eq!(problem["errors"][0]["pointer"], "/kernel/length_scale", "{problem}");
+    points[17].pop();
+    let problem = server.post("/v1/interpolation", &body(&points, smooth())).await;
+    let problem = problem.expect_problem(422, "invalid-cloud");
+    assert_eq!(problem["errors"][0]["pointer"], "/cloud/points/17", "{problem}");
+}
+
+#[tokio::test]
+async fn landmarks_warn_of_a_condition_as_the_dense_solver_does() {
+    let server = Server::start().await;
+    for (alpha, warns) in [(1e-4, false), (1e-12, true)] {
+        for solver in ["dense", "landmark"] {
+            let more = json!({"values": true, "queries": [[0.6, 0.8, 0.0]], "alpha": alpha});
+            let answer = server.post("/v1/interpolation", &body(solver, &smooth(), &more)).await.expect_ok();
+            let warnings = answer["diagnostics"]["warnings"].as_array().unwrap();
+            let found = warnings.iter().any(|warning| warning["code"] == "ill_conditioned");
+            assert_eq!(found, warns, "{solver}, α = {alpha}: {}", answer["diagnostics"]);
+        }
+    }
+}
+
+#[tokio::test]
 async fn kernels_that_need_too_many_landmarks_are_refused_with_a_remedy() {
     let server = Server::start().await;
     let points = fibonacci_sphere(3000);

@@ -1,7 +1,10 @@
 //! Rules by which `auto` takes another solver than the dense one.
 
+use crate::kernel::Kernel;
 use crate::kernel::defaults::Purpose;
 use crate::patches::MAX_LOCAL_DIMENSION;
+use crate::points::cloud::Cloud;
+use crate::sums::regularization::Regularization;
 
 /// Number of points from which `auto` regresses a surface locally, unless kernel or α are given.
 ///
@@ -27,22 +30,44 @@ pub enum AutoReason {
     Deviations,
     /// The level set of a finely sampled curve is requested.
     FineCurve,
-    /// The cloud has more points than the dense solver accepts, and few landmarks span the kernels of all of
-    /// them.
+    /// Few landmarks span the kernels of all points.
     FewLandmarks,
     /// The cloud has more points than the dense solver accepts, and the request names a tolerance, which only
     /// a function of all values can keep.
     Tolerance,
 }
 
-/// Flops of landmarks up to which `auto` takes them for values: about twenty seconds.
+/// Flops of landmarks up to which `auto` takes them for values that are not factorized: about twenty seconds.
 const MOST_FLOPS: f64 = 1e12;
 
-/// Returns whether values at more points than the dense solver accepts are fitted on so many landmarks,
-/// rather than around each query.
-pub fn prefers_landmarks(n_points: usize, n_landmarks: usize) -> bool {
-    let rank = n_landmarks as f64;
-    8.0 * n_points as f64 * rank * rank <= MOST_FLOPS
+/// Least number of points of which `auto` fits values on landmarks. Fewer are factorized within milliseconds.
+pub const LANDMARKS_FROM: usize = 1_000;
+
+/// Points per landmark from which landmarks take less time than a factorization of all points: 8 n r² flops
+/// are fewer than n³/3.
+const POINTS_PER_LANDMARK: usize = 5;
+
+/// Least noise, over k₀, for which landmarks have the digits of a factorization. Rounding leaves 1e-13 k₀ of
+/// the diagonal, so with less noise variances would lose digits, and with 1e-8 the iteration is slower than
+/// the factorization.
+const LEAST_NOISE: f64 = 1e-6;
+
+/// Returns the largest number of landmarks on which `auto` fits values, or 0 if it factorizes all points.
+///
+/// Up to `max_dense_points`, landmarks must give the digits of the factorization in less time. Beyond, the
+/// alternative is a small system around each query.
+pub fn most_landmarks(
+    cloud: &Cloud,
+    kernel: &Kernel,
+    noise: &Regularization,
+    max_dense_points: usize,
+) -> usize {
+    let n = cloud.n_points();
+    if n > max_dense_points {
+        return (MOST_FLOPS / (8.0 * n as f64)).sqrt() as usize;
+    }
+    let has_noise = || (0..n).all(|point| noise.at(point) >= LEAST_NOISE * kernel.at_zero());
+    if n >= LANDMARKS_FROM && has_noise() { n / POINTS_PER_LANDMARK } else { 0 }
 }
 
 /// A surface known only by its points, before it is fitted.

@@ -127,7 +127,8 @@ impl Solver {
         let landmarks = Landmarks::of(&system, observer)?;
         observer.enter(Stage::Condition);
         let norm1 = system.largest_row_seen(observer)?;
-        let reciprocal_condition = Some(landmarks.reciprocal_condition());
+        let condition = norm1 * landmarks.inverse_norm1();
+        let reciprocal_condition = Some(if condition.is_finite() { 1.0 / condition.max(1.0) } else { 0.0 });
         let factorization = Factorization::Landmark(Box::new(landmarks));
         Ok(Self { system, factorization, norm1, reciprocal_condition, weights_of_one: Vec::new() })
     }

@@ -29,7 +29,7 @@ pub(crate) use dense::{PIVOT_TOLERANCE, factorize_in_place};
 pub use factor::{Factor, FactorBuilder};
 pub(crate) use factorized::SMALLEST_PIVOT;
 pub use factorized::{Method, Remaining, Solver, Workspace};
-pub use landmark::expected_landmarks;
+pub use landmark::{expected_landmarks, probe_price};
 pub(crate) use solution::MAX_RELATIVE_RESIDUAL;
 pub use solution::{Disagreement, Known, Outlier, Place, Solution, Sought};
 pub use system::System;

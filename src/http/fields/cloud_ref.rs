@@ -1,11 +1,14 @@
 //! The cloud of a request, by id or by points.
 
+use std::sync::Arc;
+
 use serde::Deserialize;
 use utoipa::ToSchema;
 
 use super::schemas::CloudIdSchema;
 use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
+use crate::store::clouds::RegisteredCloud;
 
 /// A cloud, given by the id of a registered cloud or by its points. Exactly one of `id` and `points` is
 /// given.
@@ -24,4 +27,8 @@ pub struct CloudRef {
     #[serde(default, deserialize_with = "present_unless_empty")]
     #[schema(value_type = Option<Vec<Vec<f64>>>)]
     pub normals: Option<Points>,
+    /// The cloud, once the points of the request are registered.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub registered: Option<Arc<RegisteredCloud>>,
 }

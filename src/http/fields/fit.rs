@@ -37,10 +37,24 @@ pub struct Geometry {
 pub trait HasCloud {
     fn cloud(&self) -> &CloudRef;
 
+    fn cloud_mut(&mut self) -> &mut CloudRef;
+
+    /// The kernel of the request, its noise, and its solver.
+    fn process(&self) -> GivenProcess<'_>;
+
     /// The cloud of the surface, where it may differ from that of the values.
     fn surface_cloud(&self) -> Option<&CloudRef> {
         None
     }
+}
+
+/// Kernel, noise and solver of a request, as far as they are given.
+#[derive(Debug, Clone, Copy)]
+pub struct GivenProcess<'a> {
+    pub kernel: Option<&'a Kernel>,
+    pub alpha: Option<f64>,
+    pub noise_variances: Option<&'a Vec<f64>>,
+    pub solver: SolverChoice,
 }
 
 /// The fields that determine a fit, moved out of a request.
@@ -113,6 +127,19 @@ macro_rules! request {
         impl $crate::http::fields::HasCloud for $name {
             fn cloud(&self) -> &$crate::http::fields::CloudRef {
                 &self.cloud
+            }
+
+            fn cloud_mut(&mut self) -> &mut $crate::http::fields::CloudRef {
+                &mut self.cloud
+            }
+
+            fn process(&self) -> $crate::http::fields::GivenProcess<'_> {
+                $crate::http::fields::GivenProcess {
+                    kernel: self.kernel.as_ref(),
+                    alpha: self.alpha,
+                    noise_variances: self.noise_variances.as_ref(),
+                    solver: self.solver.unwrap_or_default(),
+                }
             }
 
             $(fn surface_cloud(&self) -> Option<&$crate::http::fields::CloudRef> {

@@ -19,6 +19,6 @@ pub use diagnostics::{
     WarningCode,
 };
 pub(crate) use fit::request;
-pub use fit::{Fit, Geometry, HasCloud};
+pub use fit::{Fit, Geometry, GivenProcess, HasCloud};
 pub use hyperparameters::{Hyperparameters, NoiseRatio};
 pub use kernel::{Kernel, KernelFamily, KernelUsed};

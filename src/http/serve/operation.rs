@@ -15,9 +15,9 @@ use super::fitted::Fits;
 use super::fitting::{Fitting, Outlook};
 use super::intake::{ReceivedBody, read_body};
 use super::plan::{Cost, FitPlan, PlannedFit, PlannedSurface, PlannedValues};
-use super::planner::Planner;
+use super::planner::{Known, LandmarkProbe, Planner, ValuesUse};
 use super::report::AnswerHeaders;
-use super::sampling::find_lacking;
+use super::sampling::{find_lacking, find_landmarks};
 use crate::config::Config;
 use crate::http::compute::{Admission, JobObserver, Work, is_light};
 use crate::http::fields::HasCloud;
@@ -49,6 +49,11 @@ pub trait Operation: Declared + HasCloud + DeserializeOwned + Send + 'static {
 
     /// Formats of answers, the preferred one first. Answers of one matrix also have npy.
     const FORMATS: &'static [Format] = &[Format::Json, Format::Safetensors];
+
+    /// What the request fits to values.
+    fn values_use(&self) -> ValuesUse {
+        ValuesUse::Nothing
+    }
 
     /// Checks everything that can be checked without computing, the cost included.
     ///
@@ -275,23 +280,31 @@ async fn prepare<O: Operation>(
     let shared = call.clone();
     let parse = move |observer: &JobObserver| {
         let (request, memory) = parsed(intake, &shared.app, observer)?;
-        let received = Received { request, memory, clouds: Vec::new() };
+        let received = Received { request, memory, known: Known::default() };
         let absent = ids_not_in_memory(&shared.app, shared.admission.owner, &received.request);
         if !absent.is_empty() {
             return Ok(Parsed::NotInMemory(Box::new(received), absent));
         }
-        planned(&shared, received, observer).map(Parsed::Planned)
+        planned(&shared, received, observer)
     };
-    let planned = match app.compute.run(admission, flops, parse).await?.0? {
-        Parsed::Planned(planned) => planned,
-        Parsed::NotInMemory(mut received, ids) => {
-            for id in ids {
-                received.clouds.extend(find_cloud(app, admission, id).await?);
+    let mut parsed = app.compute.run(admission, flops, parse).await?.0?;
+    let planned = loop {
+        let received = match parsed {
+            Parsed::Planned(planned) => break planned,
+            Parsed::NotInMemory(mut received, ids) => {
+                for id in ids {
+                    received.known.clouds.extend(find_cloud(app, admission, id).await?);
+                }
+                received
             }
-            let shared = call.clone();
-            let plan = move |observer: &JobObserver| planned(&shared, *received, observer);
-            app.compute.run(admission, 0.0, plan).await?.0?
-        }
+            Parsed::NotProbed(mut received, probe) => {
+                received.known.landmarks = Some(find_landmarks(app, admission, *probe).await?);
+                received
+            }
+        };
+        let shared = call.clone();
+        let plan = move |observer: &JobObserver| planned(&shared, *received, observer);
+        parsed = app.compute.run(admission, 0.0, plan).await?.0?;
     };
     let (mut plan, memory, fresh) = match planned {
         Planned::Done(prepared) => return Ok(prepared),
@@ -309,15 +322,20 @@ fn planned<O: Operation>(
     call: &Call,
     received: Received<O>,
     observer: &JobObserver,
-) -> Result<Planned<O::Work>, Problem> {
+) -> Result<Parsed<O>, Problem> {
     let Call { app, admission, wanted, began } = call;
-    let Received { request, mut memory, clouds } = received;
-    let planner = Planner::with_clouds(app, admission.owner, clouds);
+    let Received { mut request, mut memory, known } = received;
+    let mut planner = Planner::knowing(app, admission.owner, known);
+    let values_use = request.values_use();
+    if let Some(probe) = planner.landmark_probe(&mut request, values_use)? {
+        let received = Received { request, memory, known: planner.into_known() };
+        return Ok(Parsed::NotProbed(Box::new(received), Box::new(probe)));
+    }
     let mut plan = request.plan(&planner)?;
-    let fresh = planner.into_fresh();
+    let fresh = planner.into_known().fresh.into_inner();
     memory.shrink_to(n_bytes_held(&plan));
     if lacking_mut(&mut plan).is_some() {
-        return Ok(Planned::Lacking(Box::new(plan), memory, fresh));
+        return Ok(Parsed::Planned(Planned::Lacking(Box::new(plan), memory, fresh)));
     }
     let plan = resolve(plan, memory, fresh)?;
     let mut report = AnswerHeaders::parsed_in(began.elapsed(), plan.main.stored.id);
@@ -327,7 +345,7 @@ fn planned<O: Operation>(
         let found = fitting.at_hand(&plan.main, plan.surface.as_ref(), plan.cost, &mut report)?;
         Some((found, wanted))
     });
-    Ok(match at_hand {
+    Ok(Parsed::Planned(match at_hand {
         None => Planned::Done(Prepared::Ready(Box::new(plan))),
         Some(((fits, memory), wanted)) => {
             let fresh = plan.fresh.clone();
@@ -337,7 +355,7 @@ fn planned<O: Operation>(
             admission.did_at_once(work, began.elapsed());
             Planned::Done(Prepared::Answered(Box::new(answered), fresh))
         }
-    })
+    }))
 }
 
 /// Finds the clouds that a request names and memory does not have, if there is a store to look in.
@@ -351,11 +369,11 @@ fn ids_not_in_memory<O: Operation>(app: &App, owner: Owner, request: &O) -> Vec<
     ids.filter(|&id| !is_at_hand(id)).collect()
 }
 
-/// A parsed request with its memory, and the clouds that were read from the store for it.
+/// A parsed request with its memory, and what is known of its clouds.
 struct Received<O> {
     request: O,
     memory: Reservation,
-    clouds: Vec<Arc<RegisteredCloud>>,
+    known: Known,
 }
 
 /// A request whose body was parsed.
@@ -363,6 +381,8 @@ enum Parsed<O: Operation> {
     Planned(Planned<O::Work>),
     /// Some clouds of the request have to be read from the store before it can be planned.
     NotInMemory(Box<Received<O>>, Vec<CloudId>),
+    /// `auto` chooses a solver by a number of landmarks that is not known yet.
+    NotProbed(Box<Received<O>>, Box<LandmarkProbe>),
 }
 
 /// A request that was checked.

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::plan::{Lack, PlannedFit, PlannedValues, Values};
+use super::planner::LandmarkProbe;
 use crate::http::compute::{Admission, JobObserver};
 use crate::http::problem::{Pointers, Problem};
 use crate::http::state::app::App;
@@ -81,6 +82,29 @@ pub async fn find_sampling(
     let looking =
         look_at(app, admission, flops, move |observer: &JobObserver| Sampling::of(&cloud, observer));
     app.clouds.sampling(admission.owner, stored, || looking).await
+}
+
+/// Finds how many landmarks the kernel of a request needs.
+///
+/// # Errors
+/// Returns the errors of [`find_lacking`].
+pub async fn find_landmarks(
+    app: &Arc<App>,
+    admission: &Arc<Admission>,
+    probe: LandmarkProbe,
+) -> Result<Option<usize>, Problem> {
+    let (stored, key, price) = (probe.stored.clone(), probe.key(), probe.price());
+    let (shared, admitted) = (app.clone(), admission.clone());
+    let looking = async move {
+        let memory = shared.reserve(admitted.owner, price.n_bytes, || true).await?;
+        let look = move |observer: &JobObserver| {
+            let found = probe.run(observer);
+            drop(memory);
+            found
+        };
+        look_at(&shared, &admitted, price.flops, look).await
+    };
+    app.clouds.landmarks(admission.owner, &stored, key, || looking).await
 }
 
 /// Runs work on a cloud on the pool. It outlives the request that began it, if others wait.

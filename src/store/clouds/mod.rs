@@ -26,6 +26,7 @@ pub struct CloudStore<E> {
     clouds: FairCache<CloudId, Arc<RegisteredCloud>>,
     samplings: SingleFlight<(Owner, CloudId), Arc<Sampling>, E>,
     noise: SingleFlight<(Owner, CloudId), f64, E>,
+    landmarks: SingleFlight<(Owner, CloudId, [u8; 32]), Option<usize>, E>,
     reads: SingleFlight<(Owner, CloudId), Option<Arc<RegisteredCloud>>, E>,
     turns: FairSemaphore<(Owner, CloudId)>,
 }
@@ -36,6 +37,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
             clouds: FairCache::sparing(max_bytes, |cloud| cloud.is_pending()),
             samplings: SingleFlight::new(),
             noise: SingleFlight::new(),
+            landmarks: SingleFlight::new(),
             reads: SingleFlight::new(),
             turns: FairSemaphore::default(),
         }
@@ -132,6 +134,29 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     {
         fill(&stored.noise, &self.noise, (owner, stored.id), compute).await?;
         Ok(())
+    }
+
+    /// Returns the number of landmarks that a kernel needs, if these are few. `key` is that of kernel and noise.
+    /// Concurrent callers share one run of `compute`, and its result is kept.
+    ///
+    /// # Errors
+    /// Returns the errors of `compute`. They are not cached.
+    pub async fn landmarks<F>(
+        &self,
+        owner: Owner,
+        stored: &RegisteredCloud,
+        key: [u8; 32],
+        compute: impl FnOnce() -> F,
+    ) -> Result<Option<usize>, E>
+    where
+        F: Future<Output = Result<Option<usize>, E>> + Send + 'static,
+    {
+        if let Some(known) = stored.landmarks(key) {
+            return Ok(known);
+        }
+        let found = self.landmarks.join((owner, stored.id, key), compute).await.1?;
+        stored.set_landmarks(key, found);
+        Ok(found)
     }
 
     /// Bytes of all clouds in memory.

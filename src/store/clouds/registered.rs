@@ -27,7 +27,7 @@ pub struct RegisteredCloud {
     record: Mutex<Record>,
     pub(super) sampling: OnceLock<Arc<Sampling>>,
     pub(super) noise: OnceLock<f64>,
-    /// How many landmarks kernels were seen to need, if these are few, by the key of kernel and noise.
+    /// Number of landmarks that kernels need, if these are few, by the key of kernel and noise.
     landmarks: Mutex<HashMap<[u8; 32], Option<usize>>>,
 }
 
@@ -52,6 +52,12 @@ pub(super) enum Standing {
     Stored { seen_at: Option<Instant> },
     /// Deleted before it was written, so it will not be written.
     Deleted,
+}
+
+impl std::fmt::Debug for RegisteredCloud {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("RegisteredCloud").field("id", &self.id).finish_non_exhaustive()
+    }
 }
 
 impl RegisteredCloud {
@@ -90,26 +96,17 @@ impl RegisteredCloud {
         }
     }
 
-    /// Returns how many landmarks a kernel needs, if these are few, from memory or by a look. Requests that
-    /// come at once look for themselves, which takes less than to wait for each other.
-    ///
-    /// # Errors
-    /// Returns the errors of the look.
-    pub fn landmarks<E>(
-        &self,
-        key: [u8; 32],
-        look: impl FnOnce(&Cloud) -> Result<Option<usize>, E>,
-    ) -> Result<Option<usize>, E> {
-        if let Some(known) = self.lock_landmarks().get(&key) {
-            return Ok(*known);
-        }
-        let found = look(&self.cloud)?;
+    /// Returns how many landmarks a kernel needs, `Some(None)` if these are many, and `None` if that is not known.
+    pub fn landmarks(&self, key: [u8; 32]) -> Option<Option<usize>> {
+        self.lock_landmarks().get(&key).copied()
+    }
+
+    pub(super) fn set_landmarks(&self, key: [u8; 32], found: Option<usize>) {
         let mut known = self.lock_landmarks();
         if known.len() >= MOST_KERNELS {
             known.clear();
         }
         known.insert(key, found);
-        Ok(found)
     }
 
     #[expect(clippy::disallowed_methods, reason = "a look-up or an insertion")]

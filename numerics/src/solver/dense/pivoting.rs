@@ -50,6 +50,8 @@ pub(in crate::solver) struct Pivoting<'a> {
     columns: &'a mut [f64],
     rank: usize,
     tolerance: Tolerance,
+    /// Factor by which the predicted rank must exceed the largest one before the factorization gives up.
+    doubt: f64,
 }
 
 /// Largest diagonal entry that may remain.
@@ -71,6 +73,16 @@ impl Tolerance {
 
     pub(in crate::solver) fn at(&self, rank: usize) -> f64 {
         self.rounding.max((self.per_pivot * rank as f64).min(self.most))
+    }
+
+    /// Returns how far `remaining` has fallen from k₀ to the tolerance at a rank, in logarithms: 0 at k₀, and
+    /// 1 at the tolerance or below.
+    pub(in crate::solver) fn progress(&self, remaining: f64, rank: usize, k0: f64) -> f64 {
+        let tolerance = self.at(rank);
+        if remaining <= tolerance {
+            return 1.0;
+        }
+        ((k0 / remaining).ln() / (k0 / tolerance).ln()).clamp(0.0, 1.0)
     }
 }
 
@@ -95,12 +107,19 @@ impl<'a> Pivoting<'a> {
         let remaining = (0..n).map(|point| kernel.at_zero() + regularization.at(point)).collect();
         let order = (0..n).collect();
         let (nodes, tolerance) = (Nodes::of(cloud), Tolerance::rounding(kernel));
-        Self { cloud, kernel, regularization, nodes, order, remaining, columns, rank: 0, tolerance }
+        let doubt = f64::INFINITY;
+        Self { cloud, kernel, regularization, nodes, order, remaining, columns, rank: 0, tolerance, doubt }
     }
 
     /// Ends where as much remains as is tolerated.
     pub(in crate::solver) fn to(self, tolerance: Tolerance) -> Self {
         Self { tolerance, ..self }
+    }
+
+    /// Gives up once the rank is predicted to exceed `doubt` times the largest one. The prediction takes equal
+    /// numbers of pivots for equal factors of the diagonal that remains.
+    pub(in crate::solver) fn doubting(self, doubt: f64) -> Self {
+        Self { doubt, ..self }
     }
 
     /// Adds pivots until the largest remaining diagonal entry is tolerated, or until more than `max_rank`
@@ -115,6 +134,10 @@ impl<'a> Pivoting<'a> {
             let tolerance = self.tolerance.at(self.rank);
             if largest <= tolerance {
                 break true;
+            }
+            let progress = self.tolerance.progress(largest, self.rank, self.kernel.at_zero());
+            if self.rank as f64 > self.doubt * max_rank as f64 * progress {
+                break false;
             }
             let floor = tolerance.max(WORTH * largest);
             let n_candidates = self.gather_candidates(floor);

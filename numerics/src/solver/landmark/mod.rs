@@ -54,7 +54,7 @@ use crate::points::cloud::Cloud;
 use crate::sums::expansion::Expansion;
 use normal::NormalEquations;
 use pivots::{Chosen, SAMPLE};
-pub use probe::expected_landmarks;
+pub use probe::{expected_landmarks, probe_price};
 pub(super) use residual::TrueResidual;
 use rows::{Coordinates, Rows};
 
@@ -181,23 +181,22 @@ impl Landmarks {
         self.log_determinant
     }
 
-    /// Reciprocal condition of the normal equations, estimated in the 1-norm.
-    pub(super) fn reciprocal_condition(&self) -> f64 {
-        let rank = self.rank();
-        let solve = |x: MatMut<'_, f64>| {
-            self.solve_inner(x);
+    /// Estimates ‖(K + D)⁻¹‖₁, 1/V².
+    ///
+    /// With fewer landmarks than points, K is singular up to what remains of its diagonal, so the noise decides.
+    /// Where every point is a landmark, the eigenvalues of K may be larger than the noise.
+    pub(super) fn inverse_norm1(&self) -> f64 {
+        let of_noise = 1.0 / self.weighing.scale;
+        if self.rank() < self.system.n_points() {
+            return of_noise;
+        }
+        let solve = |mut x: MatMut<'_, f64>| {
+            self.rows.whiten(x.as_mut());
+            self.rows.solve_upper(x);
             Ok::<(), Infallible>(())
         };
-        let product = |mut x: MatMut<'_, f64>| {
-            let lower = Mat::from_fn(rank, rank, |i, j| if i < j { 0.0 } else { self.inner[(i, j)] });
-            let y = &lower * (lower.transpose() * x.as_ref());
-            x.copy_from(&y);
-            Ok::<(), Infallible>(())
-        };
-        let Ok((inverse, _)) = estimate_norm1(rank, solve, solve);
-        let Ok((norm, _)) = estimate_norm1(rank, product, product);
-        let condition = norm * inverse;
-        if condition.is_finite() { 1.0 / condition.max(1.0) } else { 0.0 }
+        let Ok((of_kernel, _)) = estimate_norm1(self.rank(), solve, solve);
+        of_kernel.min(of_noise)
     }
 
     /// Fits values `[n]`.

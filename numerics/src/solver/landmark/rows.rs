@@ -108,7 +108,7 @@ impl Rows {
     }
 
     /// `x ← L₁₁⁻ᵀx`.
-    fn solve_upper(&self, x: MatMut<'_, f64>) {
+    pub(super) fn solve_upper(&self, x: MatMut<'_, f64>) {
         let par = parallelism((x.nrows() * x.nrows() * x.ncols()) as f64);
         solve_upper_triangular_in_place(self.l11.transpose(), x, par);
     }
@@ -126,6 +126,21 @@ impl Rows {
         let remaining = self.fill(system.kernel(), system.cloud(), &mut numbers, observer)?;
         self.kept = Some(Kept { remaining, numbers });
         Ok(())
+    }
+
+    /// Returns the largest entry that remains of the diagonal at some points, V².
+    ///
+    /// # Errors
+    /// [`crate::error::NumericsError::Cancelled`].
+    pub(super) fn largest_remaining(
+        &self,
+        kernel: &Kernel,
+        at: &Cloud,
+        observer: &dyn Observer,
+    ) -> Result<f64> {
+        let mut numbers = vec![0.0; self.n_landmarks() * at.n_points()];
+        let remaining = self.fill(kernel, at, &mut numbers, observer)?;
+        Ok(remaining.into_iter().fold(0.0, f64::max))
     }
 
     /// Bytes of the rows that are kept.

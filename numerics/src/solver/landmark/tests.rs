@@ -1,12 +1,13 @@
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::error::NumericsError;
 use crate::function::interpolant::Interpolant;
 use crate::function::posterior::variances;
 use crate::kernel::{Family, Kernel};
-use crate::observer::Unobserved;
+use crate::observer::{Observer, Stage, Unobserved};
 use crate::points::cloud::Cloud;
-use crate::solver::{Solver, System};
+use crate::solver::{Solver, System, expected_landmarks};
 use crate::sums::jets::JetOrder;
 use crate::sums::regularization::Regularization;
 use crate::testing::{Random, fibonacci_sphere};
@@ -169,4 +170,73 @@ fn whichever_points_are_looked_at_first_the_function_is_the_same() {
     for seed in 1..5 {
         assert!(means(seed).iter().zip(&first).all(|(a, b)| (a - b).abs() < 1e-8), "{seed}");
     }
+}
+
+#[test]
+fn the_condition_is_that_of_the_dense_solver() {
+    for (cloud, alpha) in [(fibonacci_sphere(1500), 1e-2), (fibonacci_sphere(1500), 1e-8), (fibonacci_sphere(150), 1e-3)] {
+        let system = || system(&cloud, Family::Gauss, Regularization::Uniform(alpha));
+        let solvers = [Solver::dense(system(), &Unobserved), Solver::landmark(system(), &Unobserved)];
+        let [expected, found] = solvers.map(|solver| solver.unwrap().reciprocal_condition().unwrap());
+        assert!((0.2..5.0).contains(&(found / expected)), "α = {alpha}: {found:e}, {expected:e}");
+    }
+}
+
+#[test]
+fn a_few_hundred_points_tell_how_many_landmarks_all_need() {
+    let torus = torus(2_500);
+    let noise = Regularization::Uniform(1e-2);
+    for (cloud, family, length_scale) in [
+        (fibonacci_sphere(2_500), Family::Gauss, 0.8),
+        (torus.clone(), Family::Gauss, 1.75),
+        (torus.clone(), Family::InverseMultiquadric, 8.0),
+        (torus.clone(), Family::Matern { nu: 8.5 }, 6.0),
+    ] {
+        let kernel = Kernel::new(family, length_scale, 1.7).unwrap();
+        let expected = expected_landmarks(&cloud, &kernel, &noise, 500, &Unobserved).unwrap().unwrap();
+        let system = System::new(Arc::new(cloud), kernel, noise.clone()).unwrap();
+        let needed = Solver::landmark(system, &Unobserved).unwrap().rank();
+        let ratio = expected as f64 / needed as f64;
+        assert!((0.7..1.4).contains(&ratio), "{family:?} {length_scale}: {expected}, {needed}");
+    }
+    for (family, length_scale) in [(Family::Matern { nu: 2.5 }, 0.3), (Family::Gauss, 0.2), (Family::Laplace { epsilon: 0.0 }, 2.0)] {
+        let kernel = Kernel::new(family, length_scale, 1.7).unwrap();
+        assert_eq!(expected_landmarks(&torus, &kernel, &noise, 500, &Unobserved).unwrap(), None, "{family:?}");
+    }
+}
+
+/// Counts checkpoints, of which each follows a block of pivots.
+#[derive(Default)]
+struct Counted(AtomicUsize);
+
+impl Observer for Counted {
+    fn enter(&self, _: Stage) {}
+
+    fn is_cancelled(&self) -> bool {
+        self.0.fetch_add(1, Ordering::Relaxed);
+        false
+    }
+}
+
+#[test]
+fn a_rough_kernel_is_given_up_after_a_block_of_pivots() {
+    let (torus, noise) = (torus(2_500), Regularization::Uniform(1e-2));
+    let n_checkpoints = |length_scale: f64, family: Family| {
+        let kernel = Kernel::new(family, length_scale, 1.0).unwrap();
+        let counted = Counted::default();
+        expected_landmarks(&torus, &kernel, &noise, 500, &counted).unwrap();
+        counted.0.into_inner()
+    };
+    let (smooth, rough) = (n_checkpoints(1.75, Family::Gauss), n_checkpoints(0.3, Family::Matern { nu: 2.5 }));
+    assert!(2 * rough < smooth, "{rough} of {smooth} checkpoints");
+}
+
+/// Random points of a torus of radii 2 and ½.
+fn torus(n: usize) -> Cloud {
+    let mut random = Random(7);
+    let point = |_| {
+        let [u, v] = [(); 2].map(|()| std::f64::consts::TAU * random.uniform());
+        [(2.0 + 0.5 * v.cos()) * u.cos(), (2.0 + 0.5 * v.cos()) * u.sin(), 0.5 * v.sin()]
+    };
+    Cloud::new((0..n).flat_map(point).collect(), 3).unwrap()
 }

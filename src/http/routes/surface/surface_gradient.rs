@@ -10,7 +10,7 @@ use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
-use crate::http::serve::planner::Planner;
+use crate::http::serve::planner::{Planner, ValuesUse};
 use crate::http::wire::negotiation::Format;
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
@@ -105,6 +105,10 @@ path: "/v1/surface-gradient/matrix", tag: "operators", answer: "The matrices"
 
 impl Operation for SurfaceGradientRequest {
     type Work = AppliedWork;
+
+    fn values_use(&self) -> ValuesUse {
+        ValuesUse::OnSurface
+    }
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<AppliedWork>, Problem> {
         let values = std::mem::take(&mut self.values);

@@ -90,10 +90,7 @@ impl Fitted {
                 "Cholesky fails in float64; solved by least squares on {rank} of {n} points, which span the others to rounding"
             );
             warn(WarningCode::IllConditioned, detail);
-        } else if report.remaining.is_none()
-            && reciprocal_condition < ILL_CONDITIONED
-            && !plan.process.is_learned
-        {
+        } else if reciprocal_condition < ILL_CONDITIONED && !plan.process.is_learned {
             // Where the values decided, float64 sets the least noise. The weights follow it on purpose.
             let detail = format!("the reciprocal condition is {reciprocal_condition:.1e}");
             warn(WarningCode::IllConditioned, detail);

@@ -1,20 +1,14 @@
 //! Choice of kernel, regularization and solver in a request, and refusals of combinations that do not work.
 
 use super::inputs::length_mismatch;
-use crate::http::fields::kernel::PlannedKernel;
-use crate::http::fields::{Fit, Geometry, Hyperparameters, Kernel, SolverChoice};
+use crate::http::fields::{CloudRef, Fit, Geometry, Hyperparameters, Kernel, SolverChoice};
 use crate::http::problem::slug::Slug;
 use crate::http::problem::{Pointers, Problem};
 use crate::http::serve::plan::FittedCloud;
 use crate::http::wire::read::points::Points;
-use crate::store::key::process_key;
 use gramian_numerics::error::SolverKind;
-use gramian_numerics::kernel::defaults::DEFAULT_ALPHA;
-use gramian_numerics::model::choose::prefers_landmarks;
-use gramian_numerics::observer::Unobserved;
-use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::solver::trend::Mean;
-use gramian_numerics::solver::{DEFAULT_TOLERANCE, TOLERANCES, expected_landmarks};
+use gramian_numerics::solver::{DEFAULT_TOLERANCE, TOLERANCES};
 use gramian_numerics::sums::regularization::Regularization;
 
 /// A requested quantity that not every solver provides: its name, the pointer to it, and the solvers without.
@@ -62,24 +56,6 @@ pub(super) fn only_local_learns(member: &str) -> Problem {
     Problem::of_field(Slug::UnsupportedBySolver, format!("/{member}"), detail)
 }
 
-/// Looks whether few landmarks span the kernel of a request. A kernel that is not given follows from the
-/// values, and is rough.
-///
-/// # Errors
-/// Returns 422 for a kernel or noise that is refused.
-pub(super) fn has_few_landmarks(fit: &Fit, on: &FittedCloud) -> Result<bool, Problem> {
-    let Some(kernel) = &fit.kernel else { return Ok(false) };
-    let PlannedKernel::Given(kernel) = kernel.plan(on.pointers)? else { return Ok(false) };
-    let options =
-        FitOptions { alpha: fit.alpha, noise_variances: fit.noise_variances.clone(), ..Default::default() };
-    let noise = options.regularization(on)?.unwrap_or(Regularization::Uniform(DEFAULT_ALPHA));
-    let refused = |error| Problem::from_numerics(error, on.pointers);
-    kernel.check_dimension(on.stored.cloud.dimension()).map_err(refused)?;
-    let look = |cloud: &Cloud| expected_landmarks(cloud, &kernel, &noise, &Unobserved);
-    let n_landmarks = on.stored.landmarks(process_key(&kernel, &noise), look).map_err(refused)?;
-    Ok(n_landmarks.is_some_and(|n_landmarks| prefers_landmarks(on.n_points(), n_landmarks)))
-}
-
 /// Returns the tolerance of a request.
 ///
 /// # Errors
@@ -103,10 +79,10 @@ pub(super) fn checked_tolerance(fit: &Fit) -> Result<f64, Problem> {
 }
 
 /// Returns the pointers to the fit of a request.
-pub(super) fn pointers_of(fit: &Fit) -> Pointers {
+pub(super) fn pointers_of(cloud: &CloudRef, has_noise_variances: bool) -> Pointers {
     Pointers {
-        points: if fit.cloud.id.is_some() { "/cloud/id" } else { "/cloud/points" },
-        regularization: if fit.noise_variances.is_some() { "/noise_variances" } else { "/alpha" },
+        points: if cloud.id.is_some() { "/cloud/id" } else { "/cloud/points" },
+        regularization: if has_noise_variances { "/noise_variances" } else { "/alpha" },
         ..Pointers::REQUEST
     }
 }

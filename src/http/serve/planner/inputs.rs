@@ -89,6 +89,9 @@ impl Planner<'_> {
     /// # Errors
     /// 404 `unknown-cloud`, 413 beyond the limits, 422 for an invalid cloud.
     pub fn cloud(&self, cloud: CloudRef, pointer: &str) -> Result<Arc<RegisteredCloud>, Problem> {
+        if let Some(registered) = cloud.registered {
+            return Ok(registered);
+        }
         match (cloud.id, cloud.points) {
             (Some(id), None) => {
                 if cloud.normals.is_some() {
@@ -140,7 +143,7 @@ impl Planner<'_> {
         let (stored, is_new) = self.app.clouds.register(self.owner, cloud, normals);
         let is_there = stored.is_stored() && stored.is_trusted(TRUST);
         if self.app.durable.is_some() && !is_there {
-            self.fresh.borrow_mut().push(stored.clone());
+            self.known.fresh.borrow_mut().push(stored.clone());
         }
         Ok((stored, is_new))
     }

@@ -2,6 +2,7 @@
 
 mod choice;
 mod inputs;
+mod landmarks;
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -18,8 +19,8 @@ use crate::store::clouds::RegisteredCloud;
 use crate::store::key::{CloudId, GivenKernel, ValuesKey};
 pub use choice::Restricted;
 use choice::{
-    FitOptions, TRY_LOCAL, checked_tolerance, has_few_landmarks, local_lacks_operators, only_local_learns,
-    pointers_of, pointers_of_surface,
+    FitOptions, TRY_LOCAL, checked_tolerance, local_lacks_operators, only_local_learns, pointers_of,
+    pointers_of_surface,
 };
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::defaults::Purpose;
@@ -31,34 +32,42 @@ use gramian_numerics::surface::geometry::{GeometryRequest, SurfaceModel};
 use gramian_numerics::surface::local::Learning;
 use inputs::length_mismatch;
 pub use inputs::{GivenValues, check_seed, unknown_cloud, value_lists};
+pub use landmarks::{LandmarkProbe, ValuesUse};
 
 /// Planner of one request. It validates the parts of the request against the limits and the stored clouds.
 pub struct Planner<'a> {
     pub app: &'a App,
     pub owner: Owner,
-    /// Clouds that were read from the store.
-    found: Vec<Arc<RegisteredCloud>>,
+    known: Known,
+}
+
+/// What is known of the clouds of a request before it is planned.
+#[derive(Default)]
+pub struct Known {
+    /// Clouds that memory may have dropped again.
+    pub clouds: Vec<Arc<RegisteredCloud>>,
     /// Clouds of the request that are only in memory, or were not seen in the store lately.
-    fresh: RefCell<Vec<Arc<RegisteredCloud>>>,
+    pub fresh: RefCell<Vec<Arc<RegisteredCloud>>>,
+    /// Number of landmarks that span the kernel of the values, `Some(None)` if these are many.
+    pub landmarks: Option<Option<usize>>,
 }
 
 impl<'a> Planner<'a> {
     pub fn new(app: &'a App, owner: Owner) -> Self {
-        Self::with_clouds(app, owner, Vec::new())
+        Self { app, owner, known: Known::default() }
     }
 
-    /// Creates a planner that holds clouds from the store, which memory may have dropped again.
-    pub fn with_clouds(app: &'a App, owner: Owner, found: Vec<Arc<RegisteredCloud>>) -> Self {
-        Self { app, owner, found, fresh: RefCell::default() }
+    /// Creates a planner that knows something of the clouds of its request.
+    pub fn knowing(app: &'a App, owner: Owner, known: Known) -> Self {
+        Self { app, owner, known }
     }
 
-    /// Returns the clouds of the request that are only in memory.
-    pub fn into_fresh(self) -> Vec<Arc<RegisteredCloud>> {
-        self.fresh.into_inner()
+    pub fn into_known(self) -> Known {
+        self.known
     }
 
     fn registered(&self, id: CloudId) -> Option<Arc<RegisteredCloud>> {
-        let found = self.found.iter().find(|cloud| cloud.id == id).cloned();
+        let found = self.known.clouds.iter().find(|cloud| cloud.id == id).cloned();
         found.or_else(|| self.app.clouds.get(self.owner, id))
     }
 
@@ -73,7 +82,7 @@ impl<'a> Planner<'a> {
         restricted: Option<Restricted>,
     ) -> Result<(PlannedValues, Arc<Values>), Problem> {
         let on = self.fitted_cloud(&mut fit)?;
-        let solver = self.solver_of_values(&fit, &on)?;
+        let solver = self.solver_of_values(&fit, &on);
         if let Some(asked) = restricted.filter(|asked| asked.without.contains(&solver.kind)) {
             return Err(match solver.reason {
                 None => asked.refused_by(solver.kind),
@@ -99,7 +108,7 @@ impl<'a> Planner<'a> {
 
     /// Takes the cloud of a request out of its fit.
     fn fitted_cloud(&self, fit: &mut Fit) -> Result<FittedCloud, Problem> {
-        let pointers = pointers_of(fit);
+        let pointers = pointers_of(&fit.cloud, fit.noise_variances.is_some());
         let stored = self.cloud(std::mem::take(&mut fit.cloud), "/cloud")?;
         let (duplicates, tolerance) = (fit.duplicates, checked_tolerance(fit)?);
         Ok(FittedCloud { owner: self.owner, stored, pointers, duplicates, tolerance })
@@ -217,7 +226,7 @@ impl<'a> Planner<'a> {
         request: &GeometryRequest,
     ) -> Result<OperatorFits, Problem> {
         let on = self.fitted_cloud(&mut fit)?;
-        let (solver, options) = (self.solver_of_values(&fit, &on)?, FitOptions::of(fit));
+        let (solver, options) = (self.solver_of_values(&fit, &on), FitOptions::of(fit));
         let under = self.surface_under(&on, options.clone(), geometry)?;
         let (main, values) = self.plan_given_values(on, options, solver, given)?;
         Ok(OperatorFits { main, values, surface: self.plan_surface_under(under, request)? })
@@ -225,23 +234,23 @@ impl<'a> Planner<'a> {
 
     /// Chooses the solver of values where several would do, with the reason where `auto` did not choose the
     /// dense one.
-    fn solver_of_values(&self, fit: &Fit, on: &FittedCloud) -> Result<ValuesSolver, Problem> {
-        Ok(match fit.solver {
+    fn solver_of_values(&self, fit: &Fit, on: &FittedCloud) -> ValuesSolver {
+        match fit.solver {
             SolverChoice::Local => ValuesSolver::asked(SolverKind::Local),
+            SolverChoice::Auto if let Some(Some(_)) = self.known.landmarks => {
+                ValuesSolver { kind: SolverKind::Landmark, reason: Some(AutoReason::FewLandmarks) }
+            }
             SolverChoice::Auto if on.n_points() > self.app.config.max_dense_points => {
-                let (kind, reason) = if has_few_landmarks(fit, on)? {
-                    (SolverKind::Landmark, AutoReason::FewLandmarks)
-                } else if fit.tolerance.is_some() {
-                    (SolverKind::Iterative, AutoReason::Tolerance)
-                } else {
-                    (SolverKind::Local, AutoReason::BeyondDense)
+                let (kind, reason) = match fit.tolerance {
+                    Some(_) => (SolverKind::Iterative, AutoReason::Tolerance),
+                    None => (SolverKind::Local, AutoReason::BeyondDense),
                 };
                 ValuesSolver { kind, reason: Some(reason) }
             }
             SolverChoice::Landmark => ValuesSolver::asked(SolverKind::Landmark),
             SolverChoice::Iterative => ValuesSolver::asked(SolverKind::Iterative),
             SolverChoice::Auto | SolverChoice::Dense => ValuesSolver::asked(SolverKind::Dense),
-        })
+        }
     }
 
     /// Checks the fits for a matrix on values that are not given: of these values, and of the surface under

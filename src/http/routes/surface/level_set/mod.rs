@@ -13,7 +13,7 @@ use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
-use crate::http::serve::planner::Planner;
+use crate::http::serve::planner::{Planner, ValuesUse};
 use crate::http::wire::negotiation::Format;
 use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::write::answer::answer;
@@ -180,6 +180,10 @@ path: "/v1/level-set", tag: "geometry", answer: "The mesh"
 impl Operation for LevelSetRequest {
     type Work = LevelSetWork;
     const FORMATS: &[Format] = &[Format::Json, Format::Safetensors, Format::Ply, Format::Gltf, Format::Obj];
+
+    fn values_use(&self) -> ValuesUse {
+        if self.values.is_some() { ValuesUse::Alone } else { ValuesUse::Nothing }
+    }
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<LevelSetWork>, Problem> {
         match self.values.take() {

@@ -9,7 +9,7 @@ use crate::http::serve::answers::values::mean_coefficients;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::plan::Cost;
-use crate::http::serve::planner::{Planner, Restricted, value_lists};
+use crate::http::serve::planner::{Planner, Restricted, ValuesUse, value_lists};
 use crate::http::wire::read::points::{Points, ValueLists};
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
@@ -88,6 +88,10 @@ path: "/v1/interpolation/batch", tag: "values", answer: "The functions at the qu
 
 impl Operation for InterpolationBatchRequest {
     type Work = Work;
+
+    fn values_use(&self) -> ValuesUse {
+        ValuesUse::Alone
+    }
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let derivatives = checked_order(self.derivatives)?;

@@ -11,7 +11,7 @@ use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::plan::{Cost, Values};
-use crate::http::serve::planner::{GivenValues, Planner};
+use crate::http::serve::planner::{GivenValues, Planner, ValuesUse};
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
@@ -99,6 +99,10 @@ impl Work {
 
 impl Operation for InterpolationRequest {
     type Work = Work;
+
+    fn values_use(&self) -> ValuesUse {
+        ValuesUse::Alone
+    }
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let derivatives = checked_order(self.derivatives)?;

@@ -8,7 +8,7 @@ use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
-use crate::http::serve::planner::{Planner, value_lists};
+use crate::http::serve::planner::{Planner, ValuesUse, value_lists};
 use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::{Points, ValueLists};
 use crate::http::wire::write::answer::answer;
@@ -88,6 +88,10 @@ path: "/v1/posterior/batch", tag: "values", answer: "The posteriors at the queri
 
 impl Operation for PosteriorBatchRequest {
     type Work = Work;
+
+    fn values_use(&self) -> ValuesUse {
+        ValuesUse::Alone
+    }
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let given = value_lists(std::mem::take(&mut self.values))?;

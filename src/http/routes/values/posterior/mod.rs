@@ -12,7 +12,7 @@ use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
-use crate::http::serve::planner::{GivenValues, Planner};
+use crate::http::serve::planner::{GivenValues, Planner, ValuesUse};
 use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
@@ -125,6 +125,10 @@ path: "/v1/posterior", tag: "values", answer: "The posterior at the queries"
 
 impl Operation for PosteriorRequest {
     type Work = Work;
+
+    fn values_use(&self) -> ValuesUse {
+        ValuesUse::Alone
+    }
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let given = GivenValues::one(std::mem::take(&mut self.values));
