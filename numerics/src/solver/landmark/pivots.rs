@@ -113,7 +113,11 @@ impl Chosen {
         let cloud = system.cloud().select(&chosen);
         let coordinates = Weighing::of(system).coordinates(system);
         let tolerance = SPARE * tolerance.at(rank);
-        Ok(Self { rows: Rows::of(chosen, cloud, l11, coordinates), tolerance })
+        let mut rows = Rows::of(chosen, cloud, l11, coordinates);
+        if n == system.n_points() {
+            rows.keep_factor(kernel, l, &pivots.order);
+        }
+        Ok(Self { rows, tolerance })
     }
 }
 

@@ -11,6 +11,7 @@ use crate::error::Result;
 use crate::kernel::Kernel;
 use crate::machine::heap::vec_bytes;
 use crate::machine::parallelism::parallelism;
+use crate::machine::vector::dot;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::solver::system::System;
@@ -126,6 +127,23 @@ impl Rows {
         let remaining = self.fill(system.kernel(), system.cloud(), &mut numbers, observer)?;
         self.kept = Some(Kept { remaining, numbers });
         Ok(())
+    }
+
+    /// Keeps the rows that pivoting over all points has left, if they are few: those of `l` (`[n, r]`) are F, in
+    /// the order of the pivots.
+    pub(super) fn keep_factor(&mut self, kernel: &Kernel, l: MatRef<'_, f64>, order: &[usize]) {
+        let (n, rank) = (order.len(), self.n_landmarks());
+        if self.coordinates != Coordinates::Whitened || rank == 0 || n * rank > MOST_KEPT {
+            return;
+        }
+        let mut numbers = vec![0.0; n * rank];
+        for (row, &point) in order.iter().enumerate() {
+            let of_point = &mut numbers[point * rank..][..rank];
+            of_point.iter_mut().enumerate().for_each(|(k, number)| *number = l[(row, k)]);
+        }
+        let left = |row: &[f64]| kernel.at_zero() - dot(row, row);
+        let remaining = numbers.chunks_exact(rank).map(left).collect();
+        self.kept = Some(Kept { remaining, numbers });
     }
 
     /// Returns the largest entry that remains of the diagonal at some points, V².
