@@ -136,8 +136,8 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         Ok(())
     }
 
-    /// Returns the number of landmarks that a kernel needs, if these are few. `key` is that of kernel and noise.
-    /// Concurrent callers share one run of `compute`, and its result is kept.
+    /// Returns the number of landmarks that a kernel needs, if these are few. `key` is that of kernel and
+    /// noise. Concurrent callers share one run of `compute`, and its result is kept.
     ///
     /// # Errors
     /// Returns the errors of `compute`. They are not cached.

@@ -96,7 +96,8 @@ impl RegisteredCloud {
         }
     }
 
-    /// Returns how many landmarks a kernel needs, `Some(None)` if these are many, and `None` if that is not known.
+    /// Returns how many landmarks a kernel needs, `Some(None)` if these are many, and `None` if that is not
+    /// known.
     pub fn landmarks(&self, key: [u8; 32]) -> Option<Option<usize>> {
         self.lock_landmarks().get(&key).copied()
     }

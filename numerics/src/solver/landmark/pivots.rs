@@ -141,12 +141,20 @@ pub(super) fn tolerance(n: usize, kernel: &Kernel, noise: &Regularization) -> To
 
 /// A random sample of n points, in their order, or all of them if there are no more than that.
 pub(super) fn sampled(n: usize, count: usize) -> Vec<usize> {
+    let mut points = shuffled(n, count);
+    points.sort_unstable();
+    points
+}
+
+/// A random sample of at most n points, in random order.
+pub(super) fn shuffled(n: usize, count: usize) -> Vec<usize> {
     let mut points: Vec<usize> = (0..n).collect();
+    let keys: Vec<u64> = (0..n).map(|point| Random::of(SEED, point as u64).next()).collect();
+    let by_key = |point: &usize| (keys[*point], *point);
     if n > count {
-        let keys: Vec<u64> = (0..n).map(|point| Random::of(SEED, point as u64).next()).collect();
-        points.select_nth_unstable_by_key(count, |&point| (keys[point], point));
+        points.select_nth_unstable_by_key(count, by_key);
         points.truncate(count);
-        points.sort_unstable();
     }
+    points.sort_unstable_by_key(by_key);
     points
 }

@@ -2,7 +2,7 @@
 
 use faer::{Mat, MatRef};
 
-use super::pivots::{sampled, tolerance};
+use super::pivots::{shuffled, tolerance};
 use super::rows::{Coordinates, Rows};
 use crate::error::Result;
 use crate::kernel::Kernel;
@@ -55,13 +55,9 @@ pub fn expected_landmarks(
     if most == 0 || n_sampled + CHECKED > n {
         return Ok(None);
     }
-    let drawn = sampled(n, n_sampled + CHECKED);
-    // Points in their order may lie along a line, so those that are checked are spread over the others.
-    let is_checked = |at: usize| (at + 1) * CHECKED / drawn.len() > at * CHECKED / drawn.len();
-    let part = |checked: bool| -> Vec<usize> {
-        (0..drawn.len()).filter(|&at| is_checked(at) == checked).map(|at| drawn[at]).collect()
-    };
-    let (sample, others) = (cloud.select(&part(false)), cloud.select(&part(true)));
+    // Pivots of equal size are taken in their order, so the first ones are to lie everywhere.
+    let drawn = shuffled(n, n_sampled + CHECKED);
+    let (sample, others) = (cloud.select(&drawn[..n_sampled]), cloud.select(&drawn[n_sampled..]));
     let (tolerance, exact) = (tolerance(n, kernel, noise), Regularization::Uniform(0.0));
     let mut columns = vec![0.0; sample.n_points() * most];
     let pivoting = Pivoting::new(&sample, kernel, &exact, &mut columns);

@@ -129,8 +129,8 @@ impl Rows {
         Ok(())
     }
 
-    /// Keeps the rows that pivoting over all points has left, if they are few: those of `l` (`[n, r]`) are F, in
-    /// the order of the pivots.
+    /// Keeps the rows that pivoting over all points has left, if they are few: those of `l` (`[n, r]`) are F,
+    /// in the order of the pivots.
     pub(super) fn keep_factor(&mut self, kernel: &Kernel, l: MatRef<'_, f64>, order: &[usize]) {
         let (n, rank) = (order.len(), self.n_landmarks());
         if self.coordinates != Coordinates::Whitened || rank == 0 || n * rank > MOST_KEPT {

@@ -111,8 +111,8 @@ impl Planner<'_> {
         Ok(self.known.landmarks.is_none().then_some(probe))
     }
 
-    /// Returns the cloud of a request if it has at least so many points, and registers its points. `None` also
-    /// for a cloud that planning refuses.
+    /// Returns the cloud of a request if it has at least so many points, and registers its points. `None`
+    /// also for a cloud that planning refuses.
     fn registered_if_large(
         &mut self,
         cloud: &mut CloudRef,
