@@ -183,8 +183,8 @@ impl Landmarks {
 
     /// Estimates ‖(K + D)⁻¹‖₁, 1/V².
     ///
-    /// With fewer landmarks than points, K is singular up to what remains of its diagonal, so the noise decides.
-    /// Where every point is a landmark, the eigenvalues of K may be larger than the noise.
+    /// With fewer landmarks than points, K is singular up to what remains of its diagonal, so the noise
+    /// decides. Where every point is a landmark, the eigenvalues of K may be larger than the noise.
     pub(super) fn inverse_norm1(&self) -> f64 {
         let of_noise = 1.0 / self.weighing.scale;
         if self.rank() < self.system.n_points() {

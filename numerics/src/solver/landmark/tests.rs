@@ -174,7 +174,9 @@ fn whichever_points_are_looked_at_first_the_function_is_the_same() {
 
 #[test]
 fn the_condition_is_that_of_the_dense_solver() {
-    for (cloud, alpha) in [(fibonacci_sphere(1500), 1e-2), (fibonacci_sphere(1500), 1e-8), (fibonacci_sphere(150), 1e-3)] {
+    for (cloud, alpha) in
+        [(fibonacci_sphere(1500), 1e-2), (fibonacci_sphere(1500), 1e-8), (fibonacci_sphere(150), 1e-3)]
+    {
         let system = || system(&cloud, Family::Gauss, Regularization::Uniform(alpha));
         let solvers = [Solver::dense(system(), &Unobserved), Solver::landmark(system(), &Unobserved)];
         let [expected, found] = solvers.map(|solver| solver.unwrap().reciprocal_condition().unwrap());
@@ -190,7 +192,7 @@ fn a_few_hundred_points_tell_how_many_landmarks_all_need() {
         (fibonacci_sphere(2_500), Family::Gauss, 0.8),
         (torus.clone(), Family::Gauss, 1.75),
         (torus.clone(), Family::InverseMultiquadric, 8.0),
-        (torus.clone(), Family::Matern { nu: 8.5 }, 6.0),
+        (torus.clone(), Family::Matern { order: 8 }, 6.0),
     ] {
         let kernel = Kernel::new(family, length_scale, 1.7).unwrap();
         let expected = expected_landmarks(&cloud, &kernel, &noise, 500, &Unobserved).unwrap().unwrap();
@@ -199,9 +201,15 @@ fn a_few_hundred_points_tell_how_many_landmarks_all_need() {
         let ratio = expected as f64 / needed as f64;
         assert!((0.7..1.4).contains(&ratio), "{family:?} {length_scale}: {expected}, {needed}");
     }
-    for (family, length_scale) in [(Family::Matern { nu: 2.5 }, 0.3), (Family::Gauss, 0.2), (Family::Laplace { epsilon: 0.0 }, 2.0)] {
+    for (family, length_scale) in
+        [(Family::Matern { order: 2 }, 0.3), (Family::Gauss, 0.2), (Family::Laplace { epsilon: 0.0 }, 2.0)]
+    {
         let kernel = Kernel::new(family, length_scale, 1.7).unwrap();
-        assert_eq!(expected_landmarks(&torus, &kernel, &noise, 500, &Unobserved).unwrap(), None, "{family:?}");
+        assert_eq!(
+            expected_landmarks(&torus, &kernel, &noise, 500, &Unobserved).unwrap(),
+            None,
+            "{family:?}"
+        );
     }
 }
 
@@ -227,7 +235,8 @@ fn a_rough_kernel_is_given_up_after_a_block_of_pivots() {
         expected_landmarks(&torus, &kernel, &noise, 500, &counted).unwrap();
         counted.0.into_inner()
     };
-    let (smooth, rough) = (n_checkpoints(1.75, Family::Gauss), n_checkpoints(0.3, Family::Matern { nu: 2.5 }));
+    let (smooth, rough) =
+        (n_checkpoints(1.75, Family::Gauss), n_checkpoints(0.3, Family::Matern { order: 2 }));
     assert!(2 * rough < smooth, "{rough} of {smooth} checkpoints");
 }
 
