@@ -159,6 +159,69 @@ async fn two_points_are_registered_beside_four_clouds_of_few_positions() {
     assert_eq!(statuses, [201; 5]);
 }
 
+/// Returns regions of no point as a body of `/v1/sides`. With links they are parts of one region.
+fn empty_regions(n: usize, are_linked: bool) -> Vec<u8> {
+    let region = json!({
+        "n_points": 0, "n_signed": 0, "n_coarse": 0, "area": 0, "centre": [0, 0], "spread": 0,
+        "normal": [0, 0], "volume": 0, "lower": [0, 0], "upper": [0, 0],
+    });
+    let tile = json!({"regions": vec![region; n], "borders": [], "n_edges": 0});
+    let link = |at: usize| json!({"first": at - 1, "second": at});
+    let links: Vec<Value> = (1..n).filter(|_| are_linked).map(link).collect();
+    let body = json!({"tiles": [tile], "links": links}).to_string();
+    zstd::encode_all(body.as_bytes(), 3).unwrap()
+}
+
+async fn join_regions(process: &Process, key: &str, body: Vec<u8>) -> u16 {
+    let request = reqwest::Client::new().post(process.url("/v1/sides")).bearer_auth(key);
+    let request = request.header("content-type", "application/json").header("content-encoding", "zstd");
+    request.body(body).send().await.unwrap().status().as_u16()
+}
+
+/// Returns the processor time of a request for the sides of regions, s.
+async fn cpu_seconds_to_join(process: &Process, body: Vec<u8>) -> f64 {
+    let before = cpu_seconds(process);
+    assert_eq!(join_regions(process, "greedy", body).await, 200);
+    cpu_seconds(process) - before
+}
+
+/// Joins regions again and again with the key `greedy`.
+async fn join_regions_forever(process: &Process, body: &Vec<u8>) {
+    loop {
+        join_regions(process, "greedy", body.clone()).await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn many_empty_regions_take_no_longer_than_their_text_and_leave_another_key_its_turns() {
+    let flags = ["--threads", "2", "--deadline-seconds", "120", "--api-keys", "greedy,modest"];
+    let process = Process::start(&flags);
+    // Regions that are one piece are compared with nothing.
+    let one_piece = cpu_seconds_to_join(&process, empty_regions(48_000, true)).await;
+    let apart = cpu_seconds_to_join(&process, empty_regions(48_000, false)).await;
+    assert!(apart < 3.0 * one_piece, "{apart} s, and {one_piece} s for one piece");
+
+    let body = empty_regions(20_000, false);
+    let modest = async {
+        let mut seconds = Vec::new();
+        for k in 0..21 {
+            let points: Vec<[f64; 2]> =
+                (0..20).map(|i| [0.3 * i as f64 + k as f64, (i as f64).sin()]).collect();
+            let body = json!({"cloud": {"points": points}, "kernel": {"family": "gauss", "length_scale": 1}});
+            let request = reqwest::Client::new().post(process.url("/v1/normals")).bearer_auth("modest");
+            let before = cpu_seconds(&process);
+            assert_eq!(request.json(&body).send().await.unwrap().status(), 200);
+            seconds.push(cpu_seconds(&process) - before);
+        }
+        seconds.sort_by(f64::total_cmp);
+        seconds[seconds.len() / 2]
+    };
+    let all_greedy = futures_util::future::join_all((0..4).map(|_| join_regions_forever(&process, &body)));
+    // Processor time of the whole process, two threads of which work for the other key meanwhile.
+    let median = tokio::select! { median = modest => median, _ = all_greedy => f64::NAN };
+    assert!(median < 2.0 * one_piece, "{median} s, and {one_piece} s for one piece");
+}
+
 /// Returns the time to compute the sampling of a cloud, s: the minimum of three.
 fn seconds_to_sample(cloud: &Cloud) -> f64 {
     let time = |_| {

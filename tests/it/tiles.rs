@@ -121,6 +121,8 @@ async fn tiles_that_cannot_be_are_refused_by_their_place() {
         json!({"regions": [region], "borders": borders, "n_edges": 6})
     };
     let link = |second: usize| json!({"first": 0, "second": second});
+    let mut without_points = tile(0);
+    without_points["regions"][0]["n_points"] = json!(0);
     let cases = [
         ("/v1/regions", json!({"cloud": bare, "own": [0]}), "/cloud/normals"),
         ("/v1/regions", json!({"cloud": cloud, "own": [1, 1]}), "/own/1"),
@@ -130,6 +132,7 @@ async fn tiles_that_cannot_be_are_refused_by_their_place() {
         ("/v1/coarse", json!({"points": points, "noise_deviation": 1e308}), "/noise_deviation"),
         ("/v1/sides", json!({"tiles": [tile(0), tile(1)], "links": []}), "/tiles/1"),
         ("/v1/sides", json!({"tiles": [tile(0), tile(0)], "links": [link(1), link(2)]}), "/links/1"),
+        ("/v1/sides", json!({"tiles": [tile(0), without_points], "links": []}), "/tiles/1/regions/0"),
     ];
     for (path, body, pointer) in cases {
         let problem = server.post(path, &body).await.expect_problem(422, "invalid-request");

@@ -7,6 +7,7 @@ use super::pieces::{Bounds, Piece, is_large};
 use super::winding::field::Field;
 use super::{Directions, Sampled, gaps, n_neighbours, sides};
 use crate::error::NumericsError;
+use crate::observer::for_each;
 
 /// Cosine of neighbouring normals above which they belong to one region.
 const SAME_REGION: f64 = 0.7;
@@ -45,7 +46,7 @@ pub(super) fn consistent_signs(
     is_given: bool,
 ) -> Result<Signs, NumericsError> {
     let n = sampled.cloud.n_points();
-    let mut edges = sheet_edges(sampled, &directions.normals);
+    let mut edges = sheet_edges(sampled, &directions.normals)?;
     let mut forest = joined(&edges, &directions.has_sign);
     join_borders(&mut forest, &edges);
     let mut is_at_rim = directions.is_at_rim.clone();
@@ -60,7 +61,7 @@ pub(super) fn consistent_signs(
     let pieces = Parts::of(&found);
     let relative: Vec<f64> = found.iter().map(|found| found.sign).collect();
     let scene = Scene { sampled, directions, pieces: &pieces, relative: &relative, is_at_rim: &is_at_rim };
-    let (mut signs, mut has_rim) = scene.signs_by_piece(&edges);
+    let (mut signs, mut has_rim) = scene.signs_by_piece(&edges)?;
     let weight: f64 = edges.iter().map(|edge| edge.weight()).sum();
     let is_resolved = weight / (n * n_neighbours(sampled.cloud)) as f64 >= RESOLVED;
     let mut is_ambiguous = vec![false; n];
@@ -98,13 +99,16 @@ struct Scene<'a> {
 
 impl Scene<'_> {
     /// Chooses the signs of points, for each piece by itself. Also returns whether each piece has a rim.
-    fn signs_by_piece(&self, edges: &[Edge]) -> (Vec<f64>, Vec<bool>) {
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    fn signs_by_piece(&self, edges: &[Edge]) -> Result<(Vec<f64>, Vec<bool>), NumericsError> {
         let has_sign = &self.directions.has_sign;
         let raw = self.contradictions(edges);
         let boxes = self.boxes_of_large();
         let (mut signs, mut has_rims) =
             (self.relative.to_vec(), Vec::with_capacity(self.pieces.members.len()));
-        for (at, points) in self.pieces.members.iter().enumerate() {
+        for_each(self.pieces.members.iter().enumerate(), self.sampled.observer, |(at, points)| {
             let (sampled, directions, relative) = (self.sampled, self.directions, self.relative);
             let piece = Piece { sampled, directions, points, relative };
             let has_rim = piece.has_rim(self.is_at_rim);
@@ -116,11 +120,13 @@ impl Scene<'_> {
                 points.iter().filter(|&&point| has_sign[point]).for_each(|&point| signs[point] = 1.0);
             }
             has_rims.push(has_rim);
-        }
-        (signs, has_rims)
+        })?;
+        Ok((signs, has_rims))
     }
 
-    /// Returns boxes around the pieces that have a hundredth of the points or more: a hundred boxes at most.
+    /// Returns boxes around the large pieces, [`MAX_LARGE`] at most.
+    ///
+    /// [`MAX_LARGE`]: super::pieces::MAX_LARGE
     fn boxes_of_large(&self) -> Vec<(usize, Bounds)> {
         let (cloud, members) = (self.sampled.cloud, &self.pieces.members);
         let large = (0..members.len()).filter(|&piece| is_large(members[piece].len(), cloud.n_points()));

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::forest::SignedForest;
 use super::{Sampled, n_neighbours};
+use crate::error::Result;
 use crate::machine::vector::dot;
 use crate::points::cloud::{Cloud, squared_distance};
 
@@ -11,7 +12,7 @@ use crate::points::cloud::{Cloud, squared_distance};
 const LEAST_WEIGHT: f64 = 0.01;
 
 /// Points whose edges are found at once.
-const BLOCK: usize = 1 << 16;
+pub(super) const BLOCK: usize = 1 << 16;
 
 /// Two neighbours on one sheet of the surface. There are several for each point, so that their bytes count.
 pub(super) struct Edge {
@@ -78,16 +79,20 @@ fn cosine(cloud: &Cloud, normals: &[f64], a: usize, b: usize) -> f64 {
 /// point.
 ///
 /// The sign of the normals does not matter.
-pub(super) fn sheet_edges(sampled: &Sampled<'_>, normals: &[f64]) -> Vec<Edge> {
+///
+/// # Errors
+/// [`crate::error::NumericsError::Cancelled`].
+pub(super) fn sheet_edges(sampled: &Sampled<'_>, normals: &[f64]) -> Result<Vec<Edge>> {
     let edges_of = |a: usize| edges_around(sampled.cloud, normals, a, sampled.around.around(a));
     let n = sampled.cloud.n_points();
     // Block by block, so that they are not held twice.
     let mut edges = Vec::with_capacity(n * n_neighbours(sampled.cloud));
     for first in (0..n).step_by(BLOCK) {
+        sampled.observer.checkpoint()?;
         let block = first..(first + BLOCK).min(n);
         edges.extend(block.into_par_iter().flat_map_iter(edges_of).collect::<Vec<Edge>>());
     }
-    edges
+    Ok(edges)
 }
 
 /// Returns the edges of [`sheet_edges`] that begin at a point. `around` has the nearest positions to it,

@@ -146,5 +146,9 @@ pub(crate) fn n_around(cloud: &Cloud) -> usize {
 
 /// Returns how many neighbours a point shares edges with.
 fn n_neighbours(cloud: &Cloud) -> usize {
-    2 * cloud.dimension() + 2
+    n_neighbours_in(cloud.dimension())
+}
+
+fn n_neighbours_in(dimension: usize) -> usize {
+    2 * dimension + 2
 }

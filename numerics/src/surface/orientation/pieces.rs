@@ -137,9 +137,12 @@ pub(super) fn area(sampling: &Sampling, point: usize, dimension: usize) -> f64 {
     sampling.spacing(point).powi(dimension as i32 - 1)
 }
 
-/// Returns whether a piece has a hundredth of the points or more. Others may lie inside it.
+/// Most pieces of one surface that [`is_large`] can hold for.
+pub(super) const MAX_LARGE: usize = 100;
+
+/// Returns whether a piece has a hundredth of the points or more, and at least one. Others may lie inside it.
 pub(super) fn is_large(n_points: usize, n_of_all: usize) -> bool {
-    n_points >= n_of_all.div_ceil(100)
+    n_points >= n_of_all.div_ceil(MAX_LARGE).max(1)
 }
 
 /// The axis-parallel box around some points.

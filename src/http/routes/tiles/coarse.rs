@@ -73,7 +73,7 @@ impl DirectOperation for CoarseRequest {
     type Answer = CoarseResponse;
 
     fn price(&self) -> Price {
-        coarse_price(self.points.n_rows, self.points.dimension)
+        coarse_price(self.points.n_rows, self.points.dimension, self.count)
     }
 
     fn compute(self, planner: &Planner<'_>, observer: &JobObserver) -> Result<CoarseResponse, Problem> {

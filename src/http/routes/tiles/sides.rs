@@ -17,7 +17,7 @@ use crate::http::serve::planner::Planner;
 use crate::http::state::app::App;
 use crate::store::Owner;
 use gramian_numerics::machine::price::Price;
-use gramian_numerics::surface::tiles::{self, Tiling};
+use gramian_numerics::surface::tiles::{self, Tiling, TilingSize};
 
 /// The regions of all tiles of a cloud, and which of them are parts of one region.
 #[derive(Debug, Deserialize, ToSchema)]
@@ -84,17 +84,24 @@ impl DirectOperation for SidesRequest {
     type Answer = SidesResponse;
 
     fn price(&self) -> Price {
-        let sizes = self.tiles.iter().map(|tile| (tile.regions.len(), tile.borders.len()));
-        let (n_regions, n_borders) =
-            sizes.fold((0, 0), |(a, b), (regions, borders)| (a + regions, b + borders));
-        tiles::sides_price(n_regions, n_borders + self.links.len())
+        let of_region = |region: &Region| {
+            region.centre.len() + region.normal.len() + region.lower.len() + region.upper.len()
+        };
+        let mut size = TilingSize { n_borders: self.links.len(), ..TilingSize::default() };
+        for tile in &self.tiles {
+            size.n_regions += tile.regions.len();
+            size.n_borders += tile.borders.len();
+            size.n_coordinates += tile.regions.iter().map(of_region).sum::<usize>();
+        }
+        tiles::sides_price(size)
     }
 
-    fn compute(self, _: &Planner<'_>, _: &JobObserver) -> Result<SidesResponse, Problem> {
+    fn compute(self, _: &Planner<'_>, observer: &JobObserver) -> Result<SidesResponse, Problem> {
         let tiles: Vec<tiles::TileRegions> = self.tiles.into_iter().map(TileRegions::into).collect();
         let refuse = |error| Problem::from_numerics(error, Pointers::REQUEST);
         let links: Vec<[usize; 2]> = self.links.iter().map(|link| [link.first, link.second]).collect();
-        let sides = Tiling::of(&tiles, &links).map_err(refuse)?.sides();
+        let tiling = Tiling::of(&tiles, &links, observer).map_err(refuse)?;
+        let sides = tiling.sides(observer).map_err(refuse)?;
         Ok(SidesResponse {
             signs: sides.iter().map(|side| if side.sign < 0.0 { -1 } else { 1 }).collect(),
             are_doubtful: sides.iter().map(|side| side.is_doubtful).collect(),

@@ -1,6 +1,8 @@
 //! Connected pieces of the regions of all tiles, and the side of each.
 
-use super::{Region, total};
+use super::Region;
+use crate::error::NumericsError;
+use crate::observer::{Observer, for_each};
 use crate::patches::n_regressed;
 use crate::surface::orientation::consistent::LOCAL_CONTRADICTION;
 use crate::surface::orientation::pieces::{Bounds, Evidence, are_several, is_large};
@@ -51,7 +53,7 @@ impl Piece<'_> {
 
     /// Returns whether the coarse cloud has so much of the piece that its function knows the side.
     pub(super) fn is_resolved(&self) -> bool {
-        total(self.members.iter().map(|member| member.region.n_coarse)) >= RESOLVED_BY
+        self.regions().map(|region| region.n_coarse).sum::<usize>() >= RESOLVED_BY
     }
 
     /// Returns whether the piece is several surfaces that nearly touch. The function contradicts itself
@@ -66,7 +68,7 @@ impl Piece<'_> {
     }
 
     pub(super) fn n_points(&self) -> usize {
-        total(self.members.iter().map(|member| member.region.n_points))
+        self.regions().map(|region| region.n_points).sum()
     }
 
     pub(super) fn bounds(&self) -> Bounds {
@@ -110,13 +112,40 @@ impl Piece<'_> {
     }
 }
 
-/// Returns which pieces lie in the box of another one, a large one.
-pub(super) fn are_nested(pieces: &[Piece<'_>]) -> Vec<bool> {
-    let bounds: Vec<Bounds> = pieces.iter().map(Piece::bounds).collect();
-    let n_points = total(pieces.iter().map(Piece::n_points));
-    let large: Vec<usize> =
-        (0..pieces.len()).filter(|&piece| is_large(pieces[piece].n_points(), n_points)).collect();
-    let is_nested =
-        |piece: usize| large.iter().any(|&other| other != piece && bounds[other].contain(&bounds[piece]));
-    (0..pieces.len()).map(is_nested).collect()
+/// Returns which pieces lie in the box of another one, a large one. There are [`MAX_LARGE`] of these at most.
+///
+/// [`MAX_LARGE`]: crate::surface::orientation::pieces::MAX_LARGE
+pub(super) fn are_nested(pieces: &[Piece<'_>], observer: &dyn Observer) -> Result<Vec<bool>, NumericsError> {
+    let mut sums = Vec::with_capacity(pieces.len());
+    for_each(pieces, observer, |piece| sums.push((piece.n_points(), piece.bounds())))?;
+    let large = large(sums.iter().map(|(n_points, _)| *n_points));
+    let is_in = |piece: usize, other: usize| other != piece && sums[other].1.contain(&sums[piece].1);
+    let mut are_nested = Vec::with_capacity(pieces.len());
+    for_each(0..pieces.len(), observer, |piece| {
+        are_nested.push(large.iter().any(|&other| is_in(piece, other)));
+    })?;
+    Ok(are_nested)
+}
+
+/// Returns the positions of the large ones among pieces with so many points.
+fn large(n_points: impl Iterator<Item = usize> + Clone) -> Vec<usize> {
+    let n_of_all = n_points.clone().sum();
+    let is_such = |(piece, n_points): (usize, usize)| is_large(n_points, n_of_all).then_some(piece);
+    n_points.enumerate().filter_map(is_such).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::orientation::pieces::MAX_LARGE;
+
+    #[test]
+    fn no_more_than_a_hundred_pieces_are_large_whatever_their_points() {
+        let of = |counts: &[usize]| large(counts.iter().copied()).len();
+        assert_eq!(of(&[0; 1000]), 0);
+        assert_eq!(of(&[1; 1000]), 0);
+        assert_eq!(of(&[7; MAX_LARGE]), MAX_LARGE);
+        assert_eq!(of(&[[1; MAX_LARGE].as_slice(), &[0; 1000]].concat()), MAX_LARGE);
+        assert_eq!(of(&[0, 99, 1, 0]), 2);
+    }
 }

@@ -6,12 +6,12 @@ use rayon::prelude::*;
 
 use crate::error::NumericsError;
 use crate::machine::vector::dot;
-use crate::observer::Observer;
+use crate::observer::{Observer, for_each};
 use crate::points::cloud::{Cloud, squared_distance};
 use crate::points::neighbourhoods::Neighbourhoods;
 use crate::points::sampling::Sampling;
 use crate::surface::orientation::consistent::joined;
-use crate::surface::orientation::edges::{Edge, edges_around};
+use crate::surface::orientation::edges::{BLOCK, Edge, edges_around};
 use crate::surface::orientation::forest::SignedForest;
 use crate::surface::orientation::pieces::{Bounds, area};
 use crate::surface::orientation::{n_around, n_neighbours};
@@ -105,7 +105,15 @@ pub(crate) fn regions_of(
     let neighbours = signed.sampling.neighbours();
     let around = Neighbourhoods::of(neighbours, &cloud.select(own), n_around(cloud), observer)?;
     let edges_of = |(at, &point)| edges_around(cloud, signed.normals, point, around.around(at));
-    let edges: Vec<Edge> = own.par_iter().enumerate().flat_map_iter(edges_of).collect();
+    let mut edges: Vec<Edge> = Vec::new();
+    for (block, points) in own.chunks(BLOCK).enumerate() {
+        observer.checkpoint()?;
+        let first = block * BLOCK;
+        edges.par_extend(
+            points.par_iter().enumerate().flat_map_iter(|(at, point)| edges_of((first + at, point))),
+        );
+    }
+    observer.checkpoint()?;
     let labels = labels(&mut joined(&edges, signed.has_sign), &edges, own);
     let n_regions = labels.iter().flatten().max().map_or(0, |last| last + 1);
     let mut members = vec![Vec::new(); n_regions];
@@ -114,7 +122,9 @@ pub(crate) fn regions_of(
     }
     let (is_own, is_coarse) = (marked(own, cloud.n_points()), marked(tile.coarse, cloud.n_points()));
     let sums = Sums { signed, is_own, is_coarse };
-    let regions = members.iter().map(|members| sums.region(members)).collect();
+    let mut regions = Vec::with_capacity(n_regions);
+    for_each(&members, observer, |members| regions.push(sums.region(members)))?;
+    observer.checkpoint()?;
     let tile =
         TileRegions { regions, borders: borders(&edges, &labels), n_edges: own.len() * n_neighbours(cloud) };
     Ok(LabelledRegions { tile, labels })

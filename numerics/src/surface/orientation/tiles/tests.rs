@@ -1,11 +1,11 @@
 //! Sides of clouds in tiles whose sides are known.
 
-use super::{Signed, Tile, Tiling, regions_of};
+use super::{Border, Region, Signed, Tile, TileRegions, Tiling, TilingSize, regions_of, sides_price};
 use crate::error::NumericsError;
 use crate::observer::Unobserved;
 use crate::points::cloud::{Cloud, squared_distance};
 use crate::points::sampling::Sampling;
-use crate::testing::Random;
+use crate::testing::{Random, StopAt};
 
 /// Reach of the points around a tile.
 const REACH: f64 = 0.2;
@@ -72,7 +72,7 @@ impl Scene {
         let links =
             regions.iter().flat_map(|of_point| of_point[1..].iter().map(|&other| [of_point[0], other]));
         let links: Vec<[usize; 2]> = links.collect();
-        let sides = Tiling::of(&tiles, &links).unwrap().sides();
+        let sides = tiled(&tiles, &links).unwrap().sides(&Unobserved).unwrap();
         regions.iter().map(|of_point| (sides[of_point[0]].sign, sides[of_point[0]].is_doubtful)).collect()
     }
 
@@ -193,25 +193,86 @@ fn surfaces_that_touch_keep_their_sides() {
     assert!(Scene::of(points, normals).sides(in_one_tile).iter().all(|side| *side == (1.0, false)));
 }
 
+fn tiled<'a>(tiles: &'a [TileRegions], links: &'a [[usize; 2]]) -> Result<Tiling<'a>, NumericsError> {
+    Tiling::of(tiles, links, &Unobserved)
+}
+
 #[test]
 fn what_leads_to_no_region_is_refused_by_its_place() {
     let sphere = Scene::sphere(100, 0);
     let scene = Scene::of(sphere.clone(), sphere);
     let all: Vec<usize> = (0..100).collect();
     let whole = scene.regions(&all, |_| true).tile;
-    assert_eq!(Tiling::of(&[], &[]).unwrap().sides(), []);
-    let far = Tiling::of(std::slice::from_ref(&whole), &[[0, 0], [0, 9]]).err().unwrap();
+    assert_eq!(tiled(&[], &[]).unwrap().sides(&Unobserved), Ok(Vec::new()));
+    let far = tiled(std::slice::from_ref(&whole), &[[0, 0], [0, 9]]).err().unwrap();
     assert_eq!(far, NumericsError::InvalidLink { link: 1 });
-    let mut open = whole.clone();
-    open.borders[0].regions[1] = 9;
-    let tiles = [whole.clone(), open];
-    assert!(matches!(Tiling::of(&tiles, &[]), Err(NumericsError::InvalidTile { tile: 1, .. })));
-    let mut vast = whole.clone();
-    vast.regions[0].n_points = usize::MAX;
-    vast.n_edges = usize::MAX;
-    assert_eq!(Tiling::of(&[vast.clone(), vast], &[]).unwrap().sides().len(), 2);
-    let mut flat = whole.clone();
-    flat.regions[0].lower.pop();
-    let tiles = [whole, flat];
-    assert!(matches!(Tiling::of(&tiles, &[]), Err(NumericsError::InvalidTile { tile: 1, .. })));
+    let refused = |change: &dyn Fn(&mut TileRegions)| {
+        let mut changed = whole.clone();
+        change(&mut changed);
+        tiled(&[whole.clone(), changed], &[]).err()
+    };
+    let is_tile = |error| matches!(error, Some(NumericsError::InvalidTile { tile: 1, .. }));
+    let is_region = |error| matches!(error, Some(NumericsError::InvalidRegion { tile: 1, region: 0, .. }));
+    assert!(is_tile(refused(&|tile| tile.borders[0].regions[1] = 9)));
+    assert!(is_tile(refused(&|tile| tile.n_edges += 1)));
+    assert!(is_region(refused(&|tile| tile.regions[0].n_points = usize::MAX)));
+    assert!(is_region(refused(&|tile| tile.regions[0].n_signed += 1)));
+    assert!(is_region(refused(&|tile| tile.regions[0].n_coarse = 101)));
+    assert!(is_region(refused(&|tile| {
+        tile.regions[0].lower.pop();
+    })));
+    assert_eq!(refused(&|_| {}), None);
+}
+
+/// Tiles with so many regions of no point, with borders and links between them.
+fn empty_regions(n: usize) -> (TileRegions, Vec<[usize; 2]>) {
+    let region = |at: usize| Region {
+        n_points: 0,
+        n_signed: 0,
+        n_coarse: 0,
+        area: 0.0,
+        centre: vec![at as f64; 3],
+        spread: 0.0,
+        normal: vec![0.0; 3],
+        volume: 0.0,
+        lower: vec![at as f64; 3],
+        upper: vec![at as f64; 3],
+    };
+    let border = |at: usize| Border { regions: [at, (at * 7) % n], agreeing: 1.0, opposing: 0.5 };
+    let tile = TileRegions {
+        regions: (0..n).map(region).collect(),
+        borders: (0..n).step_by(2).map(border).collect(),
+        n_edges: 0,
+    };
+    (tile, (0..n / 4).map(|at| [at, at + 1]).collect())
+}
+
+#[test]
+fn sides_stop_at_every_checkpoint_and_have_more_for_more_regions() {
+    let n_checkpoints = |n: usize, last: usize| {
+        let (tile, links) = empty_regions(n);
+        let observer = StopAt::checkpoint(last);
+        let tiles = [tile];
+        let sides = Tiling::of(&tiles, &links, &observer).and_then(|tiling| tiling.sides(&observer));
+        (sides.map(|sides| sides.len()), observer.n_checkpoints())
+    };
+    let (sides, few) = n_checkpoints(2000, usize::MAX);
+    assert_eq!(sides, Ok(2000));
+    let (sides, many) = n_checkpoints(20_000, usize::MAX);
+    assert_eq!(sides, Ok(20_000));
+    assert!(many > 5 * few, "{few} and {many}");
+    for last in (0..few).step_by(few.div_ceil(40)) {
+        assert_eq!(n_checkpoints(2000, last).0, Err(NumericsError::Cancelled), "{last}");
+    }
+}
+
+#[test]
+fn prices_grow_as_the_regions_and_what_each_is_compared_with() {
+    let flops = |n_regions: usize| {
+        let size = TilingSize { n_regions, n_borders: n_regions, n_coordinates: 12 * n_regions };
+        sides_price(size).flops
+    };
+    // Below a hundred regions each may be compared with each, and beyond that with a hundred.
+    assert!(flops(100) > 12.0 * flops(10));
+    assert!((flops(1_000_000) / flops(100_000) - 10.0).abs() < 1.5);
 }

@@ -36,7 +36,7 @@ impl WindingNumbers {
         }
         let around = Neighbourhoods::of(sampling.neighbours(), cloud, n_around(cloud), observer)?;
         let sampled = Sampled { cloud, sampling, around: &around, observer };
-        let areas = areas(&sampled, normals, &sheet_edges(&sampled, normals), radius);
+        let areas = areas(&sampled, normals, &sheet_edges(&sampled, normals)?, radius);
         let rows = areas.iter().zip(normals.chunks_exact(d));
         let moments: Vec<f64> =
             rows.flat_map(|(area, normal)| normal.iter().map(move |c| area * c)).collect();

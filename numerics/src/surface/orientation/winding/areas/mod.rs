@@ -151,7 +151,7 @@ mod tests {
         let sampling = Sampling::of(&cloud, &Unobserved).unwrap();
         let around = Neighbourhoods::of(sampling.neighbours(), &cloud, 18, &Unobserved).unwrap();
         let sampled = Sampled { cloud: &cloud, sampling: &sampling, around: &around, observer: &Unobserved };
-        areas(&sampled, &normals, &sheet_edges(&sampled, &normals), 1.0)
+        areas(&sampled, &normals, &sheet_edges(&sampled, &normals).unwrap(), 1.0)
     }
 
     #[test]
