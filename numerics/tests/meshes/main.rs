@@ -371,10 +371,13 @@ fn a_bubble_beside_a_surface_has_no_points_of_its_own_and_is_dropped() {
     let mesh_over = |points: Vec<f64>| {
         let cloud = Cloud::new(points, 3).unwrap();
         let sampling = Sampling::of(&cloud, &Unobserved).unwrap();
+        let seeds = |points: std::ops::Range<usize>, _: &dyn Observer| {
+            Ok([&cloud.coordinates()[3 * points.start..3 * points.end], &[0.0, 0.0, 1.4]].concat())
+        };
         let request = LevelSetRequest {
             field: &SphereWithBubble,
             sampling: &sampling,
-            seeds: [cloud.coordinates(), &[0.0, 0.0, 1.4]].concat(),
+            seeds: &seeds,
             step: sampling.scales().spacing,
             bounds: Bounds { min: vec![-2.0; 3], max: vec![2.0; 3] },
             is_open: false,

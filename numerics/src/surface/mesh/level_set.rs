@@ -1,12 +1,14 @@
 //! The whole way from a field to its mesh.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::Mesh;
 use super::field::{Feet, Field};
 use super::lattice::cut::cut;
-use super::lattice::follow::{Bounds, Region, follow};
-use super::lattice::nodes::Lattice;
+use super::lattice::follow::{Bounds, Region, follow, sorted};
+use super::lattice::nodes::{Lattice, Node};
 use super::lattice::roots::Crossings;
 use super::parts::{Part, Parts};
 use super::regular::regular;
@@ -25,13 +27,20 @@ pub enum Quality {
     Raw,
 }
 
+/// Places from which a surface is followed, `[s, d]`: those of the points of a range.
+///
+/// There may be hundreds for a point, so no more are made at once than for [`SEEDING_POINTS`].
+pub type Seeds<'a> = dyn Fn(Range<usize>, &dyn Observer) -> Result<Vec<f64>> + Sync + 'a;
+
+/// Points whose seeds are made at once.
+pub(super) const SEEDING_POINTS: usize = 1024;
+
 /// A level set to mesh.
 pub struct LevelSetRequest<'a> {
     pub field: &'a dyn Field,
     /// The points that support the surface.
     pub sampling: &'a Sampling,
-    /// Places from which the surface is followed, `[s, d]`.
-    pub seeds: Vec<f64>,
+    pub seeds: &'a Seeds<'a>,
     /// Longest edge of the lattice, L.
     pub step: f64,
     /// Box that the surface is followed in.
@@ -132,10 +141,7 @@ fn raw_mesh(request: &LevelSetRequest<'_>, observer: &dyn Observer) -> Result<Me
     let (field, Bounds { min, max }) = (request.field, &request.bounds);
     let centre: Vec<f64> = min.iter().zip(max).map(|(a, b)| 0.5 * (a + b)).collect();
     let lattice = Lattice::new(&centre, request.step);
-    let seeds = request.seeds.chunks_exact(field.dimension()).filter(|x| request.bounds.contains(x));
-    // A step so short that the lattice does not reach a point is refused like one with too many nodes.
-    let too_short = NumericsError::TooManyNodes { limit: request.max_nodes };
-    let seeds = seeds.map(|x| lattice.cell(x)).collect::<Option<Vec<_>>>().ok_or(too_short)?;
+    let seeds = seed_cells(request, &lattice, observer)?;
     let rim = request.is_open.then_some(request.sampling);
     let region = Region { lattice: &lattice, bounds: &request.bounds, rim };
     let followed = follow(field, &region, seeds, request.max_nodes, observer)?;
@@ -147,6 +153,34 @@ fn raw_mesh(request: &LevelSetRequest<'_>, observer: &dyn Observer) -> Result<Me
     let vertices = crossings.roots(field, precision, observer)?;
     let cells = cut(&followed, &lattice, &crossings.edges);
     Ok(Mesh { dimension: field.dimension(), vertices, cells })
+}
+
+/// Finds the cells of the seeds, sorted.
+fn seed_cells(
+    request: &LevelSetRequest<'_>,
+    lattice: &Lattice,
+    observer: &dyn Observer,
+) -> Result<Vec<Node>> {
+    let LevelSetRequest { field, sampling, bounds, max_nodes, .. } = request;
+    // A step so short that the lattice does not reach a point is refused like one with too many nodes.
+    let too_many = NumericsError::TooManyNodes { limit: *max_nodes };
+    let n_points = sampling.spacings().len();
+    let mut cells = Vec::new();
+    for first in (0..n_points).step_by(SEEDING_POINTS) {
+        observer.checkpoint()?;
+        let places = (request.seeds)(first..n_points.min(first + SEEDING_POINTS), observer)?;
+        let within = places.chunks_exact(field.dimension()).filter(|x| bounds.contains(x));
+        let found = within.map(|x| lattice.cell(x)).collect::<Option<Vec<_>>>();
+        cells.append(&mut sorted(found.ok_or(too_many.clone())?));
+        if cells.len() > 2 * max_nodes {
+            cells = sorted(cells);
+            // Each cell has a first corner of its own.
+            if cells.len() > *max_nodes {
+                return Err(too_many);
+            }
+        }
+    }
+    Ok(sorted(cells))
 }
 
 /// Least size of a part over d, in spacings to the power d − 1. Smaller ones have fewer points than determine

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 
 pub use closedness::{Closedness, DOUBTFUL, OPEN};
 pub use lattice::follow::Bounds;
-pub use level_set::{LevelSet, LevelSetRequest, Quality, level_set};
+pub use level_set::{LevelSet, LevelSetRequest, Quality, Seeds, level_set};
 pub use parts::Part;
 pub use support::{Support, support};
 

@@ -1,12 +1,14 @@
 //! Meshes of the surface that a cloud samples, by its signature function or by local regressions.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::closedness::{Closedness, OPEN};
 use super::fields::interpolant::LevelOf;
 use super::fields::local::LocalField;
 use super::lattice::follow::is_inside;
-use super::level_set::{LevelSet, LevelSetRequest, Quality, level_set};
+use super::level_set::{LevelSet, LevelSetRequest, Quality, Seeds, level_set};
 use super::{Bounds, field::Field};
 use crate::error::{NumericsError, Result};
 use crate::function::interpolant::Interpolant;
@@ -56,14 +58,15 @@ pub fn mesh_of_surface(
         }
         Ok(closedness)
     };
-    let mesh = |field: &dyn Field, seeds: Vec<f64>| {
-        level_set(&LevelSetRequest { seeds, ..request(field, cloud, sampling, options) }, observer)
+    let mesh = |field: &dyn Field, seeds: &Seeds<'_>| {
+        level_set(&Sampled { cloud, sampling }.request(field, seeds, options), observer)
     };
     match surface {
         Surface::Local(local) => {
             let (field, closedness) = LocalField::of(local, options.is_open, observer)?;
             let closedness = check(closedness)?;
-            Ok((mesh(&field, field.feet_of_points())?, closedness))
+            let seeds = |points: Range<usize>, _: &dyn Observer| Ok(field.feet_of_points(points));
+            Ok((mesh(&field, &seeds)?, closedness))
         }
         Surface::Signature(signature) => {
             let normals = signature.normals();
@@ -72,8 +75,8 @@ pub fn mesh_of_surface(
             let closedness = check(closedness)?;
             let function = signature.signature();
             let field = LevelOf::new(function, mean_level(function, observer)?, 1.0);
-            let seeds = field.feet(cloud.coordinates(), observer)?.positions;
-            Ok((mesh(&field, seeds)?, closedness))
+            let seeds = |points: Range<usize>, observer: &dyn Observer| feet_of(&field, points, observer);
+            Ok((mesh(&field, &seeds)?, closedness))
         }
     }
 }
@@ -88,37 +91,88 @@ pub fn mesh_of_surface(
 pub fn mesh_of_level(field: LevelOf<'_>, options: &MeshOptions, observer: &dyn Observer) -> Result<LevelSet> {
     let cloud = field.cloud();
     let sampling = Sampling::of(cloud, observer)?;
-    let mut request = request(&field, cloud, &sampling, options);
+    let sampled = Sampled { cloud, sampling: &sampling };
     let values = field.values(cloud.coordinates(), observer)?;
-    request.seeds = field.feet(cloud.coordinates(), observer)?.positions;
-    request.seeds.extend(places_between(cloud, &request, &values));
-    level_set(&request, observer)
+    let step = sampled.step(options);
+    let seeds = |points: Range<usize>, observer: &dyn Observer| {
+        let mut places = feet_of(&field, points.clone(), observer)?;
+        places.extend(sampled.places_between(points, &values, step));
+        Ok(places)
+    };
+    level_set(&sampled.request(&field, &seeds, options), observer)
+}
+
+/// The feet of some points of the cloud of a level, `[m, d]`.
+fn feet_of(field: &LevelOf<'_>, points: Range<usize>, observer: &dyn Observer) -> Result<Vec<f64>> {
+    let (cloud, d) = (field.cloud(), field.dimension());
+    Ok(field.feet(&cloud.coordinates()[points.start * d..points.end * d], observer)?.positions)
 }
 
 /// Nearest points of a point that the level may separate it from.
 const N_NEAREST: usize = 9;
 
-/// Most places between two points.
+/// Most steps between two points.
 const MAX_BETWEEN: f64 = 32.0;
 
-/// Places half a step apart on the way from each point inside to those outside among its nearest.
-fn places_between(cloud: &Cloud, request: &LevelSetRequest<'_>, values: &[f64]) -> Vec<f64> {
-    let LevelSetRequest { sampling, step, .. } = *request;
-    let from_point = |found: &mut Vec<Neighbour>, point: usize| {
-        let x = cloud.point(point);
-        sampling.neighbours().nearest_positions_into(x, N_NEAREST, found);
-        let mut places = Vec::new();
-        for near in found.iter().filter(|near| !is_inside(values[near.point])) {
-            let n_parts = (near.squared_distance.sqrt() / (0.5 * step)).ceil().clamp(1.0, MAX_BETWEEN);
-            for part in 0..=n_parts as usize {
-                let t = part as f64 / n_parts;
-                places.extend(x.iter().zip(cloud.point(near.point)).map(|(x, y)| x + t * (y - x)));
+/// Most bytes of the seeds of a point of a level: its foot, and the places between it and its nearest points.
+pub(super) const fn seed_bytes(dimension: usize) -> usize {
+    (N_NEAREST * (MAX_BETWEEN as usize + 1) + 1) * dimension * size_of::<f64>()
+}
+
+/// A cloud with its sampling.
+#[derive(Clone, Copy)]
+struct Sampled<'a> {
+    cloud: &'a Cloud,
+    sampling: &'a Sampling,
+}
+
+impl<'a> Sampled<'a> {
+    fn step(self, options: &MeshOptions) -> f64 {
+        options.step.unwrap_or(self.sampling.scales().spacing)
+    }
+
+    /// Places half a step apart on the way from each point inside, of these, to those outside among its
+    /// nearest. `values` are those of all points.
+    fn places_between(self, points: Range<usize>, values: &[f64], step: f64) -> Vec<f64> {
+        let Self { cloud, sampling } = self;
+        let from_point = |found: &mut Vec<Neighbour>, point: usize| {
+            let x = cloud.point(point);
+            sampling.neighbours().nearest_positions_into(x, N_NEAREST, found);
+            let mut places = Vec::new();
+            for near in found.iter().filter(|near| !is_inside(values[near.point])) {
+                let n_parts = (near.squared_distance.sqrt() / (0.5 * step)).ceil().clamp(1.0, MAX_BETWEEN);
+                for part in 0..=n_parts as usize {
+                    let t = part as f64 / n_parts;
+                    places.extend(x.iter().zip(cloud.point(near.point)).map(|(x, y)| x + t * (y - x)));
+                }
             }
+            places
+        };
+        let inside = points.into_par_iter().filter(|&point| is_inside(values[point]));
+        inside.map_init(Vec::new, from_point).flatten_iter().collect()
+    }
+
+    fn request(
+        self,
+        field: &'a dyn Field,
+        seeds: &'a Seeds<'a>,
+        options: &MeshOptions,
+    ) -> LevelSetRequest<'a> {
+        let Self { cloud, sampling } = self;
+        let step = self.step(options);
+        let margin =
+            MARGIN_OF_RADIUS * cloud.radius() + MARGIN_OF_SPACING * step.max(sampling.scales().spacing);
+        LevelSetRequest {
+            field,
+            sampling,
+            seeds,
+            step,
+            bounds: options.bounds.clone().unwrap_or_else(|| Bounds::around(cloud, margin)),
+            is_open: options.is_open,
+            quality: options.quality,
+            max_nodes: options.max_nodes,
         }
-        places
-    };
-    let inside = (0..cloud.n_points()).into_par_iter().filter(|&point| is_inside(values[point]));
-    inside.map_init(Vec::new, from_point).flatten_iter().collect()
+    }
 }
 
 /// Computes the principal curvatures `[k, d−1]` and the mean curvatures `[k]` of level surfaces, 1/L,
@@ -146,25 +200,4 @@ fn mean_level(function: &Interpolant, observer: &dyn Observer) -> Result<f64> {
     let cloud = function.solver.cloud();
     let values = function.at(cloud, JetOrder::Value, observer)?.values();
     Ok(values.iter().sum::<f64>() / values.len() as f64)
-}
-
-fn request<'a>(
-    field: &'a dyn Field,
-    cloud: &'a Cloud,
-    sampling: &'a Sampling,
-    options: &MeshOptions,
-) -> LevelSetRequest<'a> {
-    let spacing = sampling.scales().spacing;
-    let step = options.step.unwrap_or(spacing);
-    let margin = MARGIN_OF_RADIUS * cloud.radius() + MARGIN_OF_SPACING * step.max(spacing);
-    LevelSetRequest {
-        field,
-        sampling,
-        seeds: Vec::new(),
-        step,
-        bounds: options.bounds.clone().unwrap_or_else(|| Bounds::around(cloud, margin)),
-        is_open: options.is_open,
-        quality: options.quality,
-        max_nodes: options.max_nodes,
-    }
 }

@@ -13,6 +13,8 @@
 //! where sheets are so near each other that some of their points have wrong sides. For these, w is softened
 //! more than for orientation. Neighbours change from place to place, so f has small jumps.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::error::Result;
@@ -102,9 +104,9 @@ impl<'a> LocalField<'a> {
         Ok((Self { surface, quadrics, winding, jump, side, is_open }, closedness))
     }
 
-    /// The feet of the points on their own quadrics, `[n, d]`: near the surface, and known without any work.
-    pub fn feet_of_points(&self) -> Vec<f64> {
-        self.surface.at_points().feet(self.surface.ordered().cloud)
+    /// The feet of some points on their own quadrics, `[m, d]`: near the surface, and known without any work.
+    pub fn feet_of_points(&self, points: Range<usize>) -> Vec<f64> {
+        self.surface.at_points().feet(self.surface.ordered().cloud, points)
     }
 
     /// Winding number at a place, with outward normals. 0 for a cloud of one position.

@@ -1,20 +1,23 @@
 //! Following of the surface from cell to cell, in fronts, so that each node is evaluated once.
 
+use std::collections::HashMap;
+use std::hash::BuildHasherDefault;
+
 use rayon::prelude::*;
 
-use super::nodes::{Lattice, Node};
+use super::nodes::{Lattice, Node, NodeHasher};
 use crate::error::{NumericsError, Result};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::points::sampling::Sampling;
 use crate::surface::mesh::field::Field;
 
-/// Values of f at nodes, sorted by node.
+/// Values of f at nodes.
+///
+/// A node is found in constant time, so that a surface of many small fronts costs what its nodes do. Nothing
+/// depends on the order of the table.
 #[derive(Debug, Clone, Default)]
-pub struct Samples {
-    nodes: Vec<Node>,
-    values: Vec<f64>,
-}
+pub struct Samples(HashMap<Node, f64, BuildHasherDefault<NodeHasher>>);
 
 /// Cells that the surface passes, sorted, and the values at all their corners.
 pub struct Followed {
@@ -70,13 +73,9 @@ impl Bounds {
 }
 
 impl Samples {
-    pub fn n_nodes(&self) -> usize {
-        self.nodes.len()
-    }
-
     /// Value at a node that was evaluated.
     pub fn value(&self, node: Node) -> f64 {
-        self.nodes.binary_search(&node).map_or(f64::NAN, |at| self.values[at])
+        self.0.get(&node).copied().unwrap_or(f64::NAN)
     }
 
     /// Values at the corners of a cell.
@@ -85,33 +84,15 @@ impl Samples {
         (0..n_corners).for_each(|corner| values[corner] = self.value(cell.corner(corner)));
         values
     }
-
-    fn contains(&self, node: Node) -> bool {
-        self.nodes.binary_search(&node).is_ok()
-    }
-
-    /// Adds sorted nodes that are not in the list.
-    fn merge(&mut self, nodes: &[Node], values: &[f64]) {
-        let n = self.nodes.len() + nodes.len();
-        let (mut all_nodes, mut all_values) = (Vec::with_capacity(n), Vec::with_capacity(n));
-        let (mut a, mut b) = (0, 0);
-        while a < self.nodes.len() || b < nodes.len() {
-            let takes_old = b == nodes.len() || a < self.nodes.len() && self.nodes[a] < nodes[b];
-            if takes_old {
-                all_nodes.push(self.nodes[a]);
-                all_values.push(self.values[a]);
-                a += 1;
-            } else {
-                all_nodes.push(nodes[b]);
-                all_values.push(values[b]);
-                b += 1;
-            }
-        }
-        (self.nodes, self.values) = (all_nodes, all_values);
-    }
 }
 
-/// Follows the surface from the cells of `seeds`, at most to `max_nodes` nodes.
+/// Cells of a front that are looked at together. Lists of their corners take some megabytes.
+const CELLS_AT_ONCE: usize = 1 << 15;
+
+/// Cells for which another thread is worth its while.
+const CELLS_PER_THREAD: usize = 256;
+
+/// Follows the surface from the sorted cells of `seeds`, at most to `max_nodes` nodes.
 ///
 /// A neighbouring cell is entered through a face whose corners differ in sign. So the surface is followed as
 /// far as it is connected, and parts of it that no seed is on are not found.
@@ -125,35 +106,76 @@ pub fn follow(
     max_nodes: usize,
     observer: &dyn Observer,
 ) -> Result<Followed> {
-    let lattice = region.lattice;
-    let n_corners = 1 << lattice.dimension();
-    let mut samples = Samples::default();
-    let (mut visited, mut front): (Vec<Node>, Vec<Node>) = (Vec::new(), sorted(seeds));
-    let mut cells = Vec::new();
+    let mut path = Path { field, region, max_nodes, samples: Samples::default(), cells: Vec::new() };
+    let (mut last, mut front) = (Vec::new(), seeds);
     while !front.is_empty() {
-        let corners = front.par_iter().flat_map_iter(|cell| (0..n_corners).map(|corner| cell.corner(corner)));
-        let new = sorted(corners.filter(|node| !samples.contains(*node)).collect());
-        if samples.n_nodes() + new.len() > max_nodes {
-            return Err(NumericsError::TooManyNodes { limit: max_nodes });
+        let mut next = Vec::new();
+        for cells in front.chunks(CELLS_AT_ONCE) {
+            let fronts = [last.as_slice(), front.as_slice()];
+            next.append(&mut path.enter(cells, fronts, observer)?);
         }
-        observer.checkpoint()?;
-        let places: Vec<f64> = new.par_iter().flat_map_iter(|&node| lattice.position(node)).collect();
-        let values = field.values(&places, observer)?;
-        samples.merge(&new, &values);
-        let crossed: Vec<(Node, [f64; 8])> = front
-            .par_iter()
-            .map(|&cell| (cell, samples.corners(cell, n_corners)))
-            .filter(|(_, values)| changes_sign(&values[..n_corners]))
-            .collect();
-        cells.extend(crossed.iter().map(|(cell, _)| *cell));
-        visited = union(&visited, &front);
-        let next =
-            crossed.par_iter().flat_map_iter(|(cell, values)| beyond_crossed_faces(*cell, values, n_corners));
-        let is_new = |cell: &Node| visited.binary_search(cell).is_err() && region.contains(*cell);
-        front = sorted(next.filter(is_new).collect());
+        (last, front) = (front, sorted(next));
     }
+    let Path { samples, mut cells, .. } = path;
     cells.par_sort_unstable();
     Ok(Followed { samples, cells })
+}
+
+/// A surface that is followed.
+struct Path<'a> {
+    field: &'a dyn Field,
+    region: &'a Region<'a>,
+    max_nodes: usize,
+    samples: Samples,
+    /// Cells that the surface passes.
+    cells: Vec<Node>,
+}
+
+impl Path<'_> {
+    /// Evaluates the corners of cells, and returns the cells beyond them that are in neither of the last two
+    /// fronts.
+    ///
+    /// A face is crossed from both of its sides. So a cell that was entered earlier has no neighbour in the
+    /// present front.
+    fn enter(&mut self, cells: &[Node], fronts: [&[Node]; 2], observer: &dyn Observer) -> Result<Vec<Node>> {
+        observer.checkpoint()?;
+        self.evaluate(cells, observer)?;
+        let n_corners = self.n_corners();
+        let (samples, region) = (&self.samples, self.region);
+        let with_values = |&cell: &Node| (cell, samples.corners(cell, n_corners));
+        let crossed: Vec<(Node, [f64; 8])> = cells
+            .par_iter()
+            .with_min_len(CELLS_PER_THREAD)
+            .map(with_values)
+            .filter(|(_, values)| changes_sign(&values[..n_corners]))
+            .collect();
+        self.cells.extend(crossed.iter().map(|(cell, _)| *cell));
+        let is_new = |cell: &Node| {
+            fronts.iter().all(|front| front.binary_search(cell).is_err()) && region.contains(*cell)
+        };
+        let crossed = crossed.par_iter().with_min_len(CELLS_PER_THREAD);
+        let next = crossed.flat_map_iter(|(cell, values)| beyond_crossed_faces(*cell, values, n_corners));
+        Ok(sorted(next.filter(is_new).collect()))
+    }
+
+    /// Evaluates f at the corners of cells where it is not known.
+    fn evaluate(&mut self, cells: &[Node], observer: &dyn Observer) -> Result<()> {
+        let (n_corners, samples, lattice) = (self.n_corners(), &self.samples.0, self.region.lattice);
+        let corners = cells.par_iter().with_min_len(CELLS_PER_THREAD);
+        let corners = corners.flat_map_iter(|cell| (0..n_corners).map(|corner| cell.corner(corner)));
+        let new = sorted(corners.filter(|node| !samples.contains_key(node)).collect());
+        if samples.len() + new.len() > self.max_nodes {
+            return Err(NumericsError::TooManyNodes { limit: self.max_nodes });
+        }
+        let places: Vec<f64> = new.iter().flat_map(|&node| lattice.position(node)).collect();
+        let values = self.field.values(&places, observer)?;
+        self.samples.0.extend(new.into_iter().zip(values));
+        Ok(())
+    }
+
+    fn n_corners(&self) -> usize {
+        1 << self.region.lattice.dimension()
+    }
 }
 
 /// Whether a value is inside.
@@ -181,16 +203,9 @@ fn beyond_crossed_faces(cell: Node, values: &[f64; 8], n_corners: usize) -> impl
     })
 }
 
-fn sorted(mut nodes: Vec<Node>) -> Vec<Node> {
+/// Sorts nodes, each once.
+pub fn sorted(mut nodes: Vec<Node>) -> Vec<Node> {
     nodes.par_sort_unstable();
     nodes.dedup();
     nodes
-}
-
-/// The union of two sorted lists without common entries.
-fn union(a: &[Node], b: &[Node]) -> Vec<Node> {
-    let mut all = [a, b].concat();
-    // Two sorted runs: the stable sort merges them.
-    all.sort();
-    all
 }

@@ -8,8 +8,11 @@
 //! Flachheit", 1942). Neighbouring cells agree on their common faces. So the level of a function that is
 //! linear on every simplex is a manifold.
 
+use std::hash::Hasher;
+
 use smallvec::SmallVec;
 
+use crate::machine::random::mixed;
 use crate::machine::small::Small;
 
 /// Bits of a coordinate of a node.
@@ -46,6 +49,24 @@ impl Node {
     /// The node whose corner this node is.
     pub fn before(self, corner: Corner) -> Self {
         Self(self.0 - offset(corner))
+    }
+}
+
+/// A hash of nodes, the same in every process. It mixes all bits, so no lattice fills one place of a table.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct NodeHasher(u64);
+
+impl Hasher for NodeHasher {
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|&byte| self.write_u64(byte.into()));
+    }
+
+    fn write_u64(&mut self, x: u64) {
+        self.0 = mixed(self.0 ^ x);
+    }
+
+    fn finish(&self) -> u64 {
+        self.0
     }
 }
 

@@ -16,7 +16,7 @@ use gramian_numerics::machine::price::{Price, Sizes};
 use gramian_numerics::model::price::{function_price, geometry_price, level_set_price};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::surface::geometry::{GeometryRequest, SurfaceModel};
-use gramian_numerics::surface::mesh::price::MeshSize;
+use gramian_numerics::surface::mesh::price::{MeshSize, Within};
 use gramian_numerics::surface::mesh::surface::MeshOptions;
 use gramian_numerics::surface::mesh::{Bounds, Quality};
 use gramian_numerics::surface::price::{AskedOfSurface, Offsets};
@@ -77,7 +77,7 @@ impl LevelSetRequest {
             return Err(Problem::invalid_request("/surface", detail));
         }
         let main = planner.surface_fit(self.take_fit(), Purpose::LevelSets, &asked.geometry)?;
-        let size = self.checked_size(&main.on)?;
+        let size = self.checked_size(&main.on, false)?;
         let sizes = vertices_of(size);
         let of_vertices = if asked.has_curvatures || asked.geometry.has_deviations {
             let of_surface = AskedOfSurface {
@@ -94,7 +94,7 @@ impl LevelSetRequest {
             n_numbers: planner.check_answer(sizes.n_queries.checked_mul(asked.n_numbers(size.dimension)))?,
             n_held: 0,
         };
-        let work = LevelSetWork { of: Subject::Surface, options: self.options(size)?, asked };
+        let work = LevelSetWork { of: Subject::Surface, options: self.options(size), asked };
         Ok(Plan::of_surface(main, work, cost))
     }
 
@@ -112,7 +112,7 @@ impl LevelSetRequest {
             Restricted { name: "level sets of values", pointer: "/values", without: &[SolverKind::Local] };
         let fit = Fit { mean: self.mean, ..self.take_fit() };
         let (main, values) = planner.values_fit(fit, GivenValues::one(values), Some(restricted))?;
-        let size = self.checked_size(&main.on)?;
+        let size = self.checked_size(&main.on, true)?;
         let sizes = vertices_of(size);
         let order = if asked.has_curvatures { 2 } else { 1 };
         let n_deviations = usize::from(asked.geometry.has_deviations);
@@ -123,7 +123,7 @@ impl LevelSetRequest {
             n_held: main.on.n_points(),
         };
         let of = Subject::Level(LevelOfValues { values, level: self.level });
-        let work = LevelSetWork { of, options: self.options(size)?, asked };
+        let work = LevelSetWork { of, options: self.options(size), asked };
         Ok(Plan::of_values(main, work, cost))
     }
 
@@ -140,17 +140,23 @@ impl LevelSetRequest {
         AskedOfVertices { geometry, has_curvatures }
     }
 
-    /// Checks that there are meshes over a cloud, and how large one is expected to be.
-    fn checked_size(&self, on: &FittedCloud) -> Result<MeshSize, Problem> {
+    /// Checks that there are meshes over a cloud, and how large one is expected to be. `is_of_values` says
+    /// that it is a level of values.
+    fn checked_size(&self, on: &FittedCloud, is_of_values: bool) -> Result<MeshSize, Problem> {
         let cloud = &on.stored.cloud;
         check_is_meshable(cloud)?;
         if self.step.is_some_and(|step| step <= 0.0) {
             return Err(Problem::invalid_request("/step", "step must be more than 0"));
         }
+        let spacing = expected_spacing(on);
+        let step = self.step.unwrap_or(spacing);
+        let bounds =
+            self.bounds.as_ref().map(|bounds| checked_bounds(bounds, cloud.dimension())).transpose()?;
         Ok(MeshSize {
             n_points: on.n_points(),
             dimension: cloud.dimension(),
-            step: self.step.map_or(1.0, |step| step / expected_spacing(on)),
+            step: step / spacing,
+            within: bounds.map(|bounds| Within::of(&bounds, cloud, step, is_of_values)),
             quality: match self.quality.unwrap_or_default() {
                 MeshQuality::Regular => Quality::Regular,
                 MeshQuality::Raw => Quality::Raw,
@@ -158,14 +164,15 @@ impl LevelSetRequest {
         })
     }
 
-    fn options(self, size: MeshSize) -> Result<MeshOptions, Problem> {
-        Ok(MeshOptions {
+    /// Options of a mesh whose size was checked.
+    fn options(self, size: MeshSize) -> MeshOptions {
+        MeshOptions {
             step: self.step,
-            bounds: self.bounds.map(|bounds| checked_bounds(bounds, size.dimension)).transpose()?,
+            bounds: self.bounds.map(|MeshBounds { min, max }| Bounds { min, max }),
             quality: size.quality,
             is_open: self.open.unwrap_or(false),
             max_nodes: size.max_nodes(),
-        })
+        }
     }
 }
 
@@ -197,16 +204,16 @@ fn check_is_meshable(cloud: &Cloud) -> Result<(), Problem> {
     Err(Problem::of_field(Slug::InvalidCloud, "/cloud/points", detail))
 }
 
-fn checked_bounds(bounds: MeshBounds, dimension: usize) -> Result<Bounds, Problem> {
+fn checked_bounds(bounds: &MeshBounds, dimension: usize) -> Result<Bounds, Problem> {
     let MeshBounds { min, max } = bounds;
-    for (list, pointer) in [(&min, "/bounds/min"), (&max, "/bounds/max")] {
+    for (list, pointer) in [(min, "/bounds/min"), (max, "/bounds/max")] {
         if list.len() != dimension {
             let detail = format!("expected {dimension} coordinates, found {}", list.len());
             return Err(Problem::of_field(Slug::DimensionMismatch, pointer, detail));
         }
     }
-    match min.iter().zip(&max).position(|(min, max)| min >= max) {
-        None => Ok(Bounds { min, max }),
+    match min.iter().zip(max).position(|(min, max)| min >= max) {
+        None => Ok(Bounds { min: min.clone(), max: max.clone() }),
         Some(axis) => {
             let detail = "must be greater than the coordinate of min";
             Err(Problem::invalid_request(format!("/bounds/max/{axis}"), detail))
