@@ -59,6 +59,8 @@ pub enum NumericsError {
     OutOfMemory { n_bytes: usize },
     #[error("tiles[{tile}] {requirement}")]
     InvalidTile { tile: usize, requirement: &'static str },
+    #[error("tiles[{tile}].regions[{region}] {requirement}")]
+    InvalidRegion { tile: usize, region: usize, requirement: &'static str },
     #[error("links[{link}] names a region that no tile has")]
     InvalidLink { link: usize },
     #[error(

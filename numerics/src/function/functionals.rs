@@ -210,7 +210,7 @@ pub(crate) fn deviations(
     let kernel = solver.kernel();
     solver.cloud().check_same_dimension(queries)?;
     if functionals.iter().any(JetFunctional::has_derivatives) {
-        check_smooth_at(solver.cloud(), kernel, queries)?;
+        check_smooth_at(solver.cloud(), kernel, queries, observer)?;
     }
     let covariances = Covariant::of(solver.known_points(), kernel);
     let of_mean =

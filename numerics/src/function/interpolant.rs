@@ -65,7 +65,7 @@ impl Interpolant {
         let (cloud, kernel) = (self.solver.cloud(), self.solver.kernel());
         cloud.check_same_dimension(queries)?;
         if order != JetOrder::Value {
-            check_smooth_at(cloud, kernel, queries)?;
+            check_smooth_at(cloud, kernel, queries, observer)?;
         }
         observer.enter(Stage::Evaluate);
         let jets = self.solver.expansion(&self.solution.weights).at(queries, order, observer)?;

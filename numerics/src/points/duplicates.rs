@@ -4,18 +4,23 @@ use std::cmp::Ordering;
 use std::collections::HashMap;
 
 use super::cloud::Cloud;
+use crate::error::Result;
+use crate::observer::{Observer, for_each};
 
 /// A hash table from coordinates to points. Coordinates match if they are equal to the bit.
 pub(crate) struct Positions(HashMap<Box<[u64]>, usize>);
 
 impl Positions {
     /// Builds the table. Points that coincide are represented by the first of them.
-    pub(crate) fn of(cloud: &Cloud) -> Self {
+    ///
+    /// # Errors
+    /// [`crate::error::NumericsError::Cancelled`].
+    pub(crate) fn of(cloud: &Cloud, observer: &dyn Observer) -> Result<Self> {
         let mut positions = HashMap::with_capacity(cloud.n_points());
-        for (point, x) in cloud.points().enumerate() {
+        for_each(cloud.points().enumerate(), observer, |(point, x)| {
             positions.entry(bits(x)).or_insert(point);
-        }
-        Self(positions)
+        })?;
+        Ok(Self(positions))
     }
 
     pub(crate) fn find(&self, x: &[f64]) -> Option<usize> {
@@ -67,6 +72,11 @@ pub(crate) fn coinciding_points(cloud: &Cloud, counts: impl Fn(usize) -> bool) -
     points
 }
 
+/// Flops of [`Merge::duplicates_of`], which allocates and looks up each position: an estimate of 500 ns each.
+pub fn merging_flops(n_points: usize) -> f64 {
+    1e4 * n_points as f64
+}
+
 /// A map from the points of a cloud to merged points, one per distinct position. n′ is the number of merged
 /// points.
 ///
@@ -84,16 +94,19 @@ pub struct Merge {
 impl Merge {
     /// Returns the cloud of distinct positions, in the order of their first occurrence, and its map. Returns
     /// `None` if there is nothing to merge.
-    pub fn duplicates_of(cloud: &Cloud) -> Option<(Cloud, Merge)> {
-        let positions = Positions::of(cloud);
+    ///
+    /// # Errors
+    /// [`crate::error::NumericsError::Cancelled`].
+    pub fn duplicates_of(cloud: &Cloud, observer: &dyn Observer) -> Result<Option<(Cloud, Merge)>> {
+        let positions = Positions::of(cloud, observer)?;
         if positions.n_distinct() == cloud.n_points() {
-            return None;
+            return Ok(None);
         }
         let mut coordinates = Vec::with_capacity(positions.n_distinct() * cloud.dimension());
         let mut group_of = vec![0; cloud.n_points()];
         let mut group_sizes = Vec::with_capacity(positions.n_distinct());
         let mut first_points = Vec::with_capacity(positions.n_distinct());
-        for (point, x) in cloud.points().enumerate() {
+        for_each(cloud.points().enumerate(), observer, |(point, x)| {
             // The table holds every point's position, so the default is never used.
             let first = positions.find(x).unwrap_or(point);
             if first == point {
@@ -105,9 +118,9 @@ impl Merge {
                 group_of[point] = group_of[first];
                 group_sizes[group_of[first]] += 1;
             }
-        }
-        let merged = Cloud::new(coordinates, cloud.dimension()).ok()?;
-        Some((merged, Merge { group_of, group_sizes, first_points }))
+        })?;
+        let merged = Cloud::new(coordinates, cloud.dimension())?;
+        Ok(Some((merged, Merge { group_of, group_sizes, first_points })))
     }
 
     /// Number of points before merging, n.
@@ -147,6 +160,9 @@ impl Merge {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::NumericsError;
+    use crate::observer::Unobserved;
+    use crate::testing::StopAt;
 
     fn cloud() -> Cloud {
         Cloud::new(vec![5.0, 1.0, 5.0, 2.0, 1.0, 5.0], 1).unwrap()
@@ -161,12 +177,29 @@ mod tests {
 
     #[test]
     fn merging_keeps_the_order_of_first_occurrence_and_averages() {
-        let (merged, merge) = Merge::duplicates_of(&cloud()).unwrap();
-        assert_eq!(merged.coordinates(), [5.0, 1.0, 2.0]);
+        let merged = |cloud: &Cloud| Merge::duplicates_of(cloud, &Unobserved).unwrap();
+        let (cloud, merge) = merged(&cloud()).unwrap();
+        assert_eq!(cloud.coordinates(), [5.0, 1.0, 2.0]);
         assert_eq!((merge.n_points(), merge.n_merged()), (6, 3));
         assert_eq!([0, 1, 2].map(|group| merge.first_point(group)), [0, 1, 3]);
         assert_eq!(merge.mean(&[3.0, 1.0, 6.0, 7.0, 3.0, 9.0]), [6.0, 2.0, 7.0]);
         assert_eq!(merge.spread(&[3.0, 4.0, 5.0]), [1.0, 2.0, 1.0, 5.0, 2.0, 1.0]);
-        assert_eq!(Merge::duplicates_of(&merged), None);
+        assert_eq!(merged(&cloud), None);
+    }
+
+    #[test]
+    fn merging_stops_at_every_checkpoint_and_has_more_for_more_points() {
+        let merged = |n: usize, last: usize| {
+            let cloud = Cloud::new((0..n).map(|point| (point / 2) as f64).collect(), 1).unwrap();
+            let observer = StopAt::checkpoint(last);
+            let merged = Merge::duplicates_of(&cloud, &observer).map(|found| found.unwrap().1.n_merged());
+            (merged, observer.n_checkpoints())
+        };
+        let (n_merged, n_checkpoints) = merged(100_000, usize::MAX);
+        assert_eq!(n_merged, Ok(50_000));
+        assert!(n_checkpoints > 20 && merged(1000, usize::MAX).1 < 5, "{n_checkpoints}");
+        for last in 0..n_checkpoints {
+            assert_eq!(merged(100_000, last).0, Err(NumericsError::Cancelled));
+        }
     }
 }

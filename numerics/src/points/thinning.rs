@@ -2,6 +2,8 @@
 
 use super::cells::halve;
 use super::cloud::Cloud;
+use crate::error::Result;
+use crate::observer::Observer;
 
 /// Greatest number of points of the coarse cloud. Factorizing 6,000 takes a second and a half on two cores.
 /// With 4,000, thin parts of a scan have a third more normals on the wrong side.
@@ -21,49 +23,69 @@ pub(crate) fn n_coarse(n_points: usize) -> usize {
 ///
 /// The cloud is halved again and again into parts with equally many points, as many as points are wanted.
 /// Each part contributes the point in the middle along its last halving.
-pub(crate) fn thinned_points(cloud: &Cloud, count: usize) -> Vec<usize> {
+///
+/// # Errors
+/// [`crate::error::NumericsError::Cancelled`].
+pub(crate) fn thinned_points(cloud: &Cloud, count: usize, observer: &dyn Observer) -> Result<Vec<usize>> {
     let n = cloud.n_points();
     if count >= n {
-        return (0..n).collect();
+        return Ok((0..n).collect());
     }
     let mut order: Vec<u32> = (0..n as u32).collect();
-    let mut chosen = Vec::with_capacity(count);
-    choose(cloud, &mut order, count.max(1), &mut chosen);
-    chosen.sort_unstable();
-    chosen
+    let mut choice = Choice { cloud, observer, chosen: Vec::with_capacity(count) };
+    choice.choose(&mut order, count.max(1))?;
+    choice.chosen.sort_unstable();
+    Ok(choice.chosen)
 }
 
-/// Chooses `count` of these points and appends them to `chosen`.
-fn choose(cloud: &Cloud, points: &mut [u32], count: usize, chosen: &mut Vec<usize>) {
-    if count == 0 || points.is_empty() {
-        return;
+/// Points from which on a halving has a checkpoint of its own.
+const CHECKED: usize = 1 << 12;
+
+/// Points that are chosen one after the other.
+struct Choice<'a> {
+    cloud: &'a Cloud,
+    observer: &'a dyn Observer,
+    chosen: Vec<usize>,
+}
+
+impl Choice<'_> {
+    /// Chooses `count` of these points.
+    fn choose(&mut self, points: &mut [u32], count: usize) -> Result<()> {
+        if count == 0 || points.is_empty() {
+            return Ok(());
+        }
+        if points.len() >= CHECKED {
+            self.observer.checkpoint()?;
+        }
+        if count == 1 {
+            let middle = (points.len() - 1) / 2;
+            let chosen = halve(self.cloud, points, middle).1.first();
+            self.chosen.extend(chosen.map(|&point| point as usize));
+            return Ok(());
+        }
+        let middle = points.len().div_ceil(2);
+        let (left, right) = halve(self.cloud, points, middle);
+        self.choose(left, count.div_ceil(2))?;
+        self.choose(right, count / 2)
     }
-    if count == 1 {
-        let middle = (points.len() - 1) / 2;
-        chosen.extend(halve(cloud, points, middle).1.first().map(|&point| point as usize));
-        return;
-    }
-    let middle = points.len().div_ceil(2);
-    let (left, right) = halve(cloud, points, middle);
-    choose(cloud, left, count.div_ceil(2), chosen);
-    choose(cloud, right, count / 2, chosen);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::observer::Unobserved;
     use crate::testing::fibonacci_sphere;
 
     #[test]
     fn thinned_clouds_have_as_many_points_as_asked_for_all_over() {
         let cloud = fibonacci_sphere(1000);
         for count in [1, 2, 7, 100, 999] {
-            let few = thinned_points(&cloud, count);
+            let few = thinned_points(&cloud, count, &Unobserved).unwrap();
             assert_eq!(few.len(), count);
             assert!(few.windows(2).all(|pair| pair[0] < pair[1]) && few.iter().all(|&point| point < 1000));
         }
-        assert_eq!(thinned_points(&cloud, 2000).len(), 1000);
-        let few = cloud.select(&thinned_points(&cloud, 100));
+        assert_eq!(thinned_points(&cloud, 2000, &Unobserved).unwrap().len(), 1000);
+        let few = cloud.select(&thinned_points(&cloud, 100, &Unobserved).unwrap());
         let n_near = |x: &[f64]| {
             few.points().filter(|y| x.iter().zip(*y).map(|(a, b)| a * b).sum::<f64>() > 0.8).count()
         };
@@ -74,6 +96,6 @@ mod tests {
     #[test]
     fn copies_of_one_point_are_thinned_too() {
         let cloud = Cloud::new(vec![1.0; 30], 3).unwrap();
-        assert_eq!(thinned_points(&cloud, 4).len(), 4);
+        assert_eq!(thinned_points(&cloud, 4, &Unobserved).unwrap().len(), 4);
     }
 }

@@ -7,7 +7,7 @@ use crate::error::NumericsError;
 use crate::kernel::Family;
 use crate::observer::{Stage, Unobserved};
 use crate::points::cloud::squared_distance;
-use crate::testing::{all_families, circle, fibonacci_sphere};
+use crate::testing::{StopAt, all_families, circle, fibonacci_sphere};
 
 fn dense(cloud: &Cloud, family: Family, length_scale: f64, alpha: f64) -> Solver {
     let kernel = Kernel::new(family, length_scale, 1.0).unwrap();
@@ -160,29 +160,15 @@ fn a_cancelled_factorization_stops() {
     assert!(matches!(outcome, Err(NumericsError::Cancelled)));
 }
 
-/// An observer that cancels at the checkpoint of this number, and counts checkpoints.
-struct StopAt {
-    checkpoint: usize,
-    n_checkpoints: std::sync::atomic::AtomicUsize,
-}
-
-impl Observer for StopAt {
-    fn enter(&self, _stage: Stage) {}
-
-    fn is_cancelled(&self) -> bool {
-        self.n_checkpoints.fetch_add(1, std::sync::atomic::Ordering::Relaxed) >= self.checkpoint
-    }
-}
-
 #[test]
 fn the_fallback_stops_at_every_checkpoint() {
     let cloud = Arc::new(fibonacci_sphere(700));
     let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
     let outcome = |checkpoint: usize| {
-        let observer = StopAt { checkpoint, n_checkpoints: Default::default() };
+        let observer = StopAt::checkpoint(checkpoint);
         let solver = System::new(cloud.clone(), kernel.clone(), Regularization::Uniform(0.0))
             .and_then(|system| Solver::dense(system, &observer));
-        (solver.map(|f| f.method()), observer.n_checkpoints.into_inner())
+        (solver.map(|f| f.method()), observer.n_checkpoints())
     };
     let (method, n_checkpoints) = outcome(usize::MAX);
     assert_eq!(method, Ok(Method::PivotedCholesky));
@@ -199,7 +185,7 @@ fn landmarks_and_iterations_stop_at_every_checkpoint() {
     let values: Vec<f64> = cloud.points().map(|x| (2.0 * x[0]).sin()).collect();
     for family in [Family::Gauss, Family::Laplace { epsilon: 0.0 }] {
         let outcome = |checkpoint: usize| {
-            let observer = StopAt { checkpoint, n_checkpoints: Default::default() };
+            let observer = StopAt::checkpoint(checkpoint);
             let kernel = Kernel::new(family, 1.0, 1.0).unwrap();
             let system = System::new(cloud.clone(), kernel, Regularization::Uniform(1e-3)).unwrap();
             let solver = match family {
@@ -207,7 +193,7 @@ fn landmarks_and_iterations_stop_at_every_checkpoint() {
                 _ => Solver::iterative_to(1e-9, system, &observer),
             };
             let found = solver.and_then(|solver| Solution::of(&solver, &values, &observer));
-            (found.map(|solution| solution.relative_residual <= 1e-9), observer.n_checkpoints.into_inner())
+            (found.map(|solution| solution.relative_residual <= 1e-9), observer.n_checkpoints())
         };
         let (found, n_checkpoints) = outcome(usize::MAX);
         assert_eq!(found, Ok(true));

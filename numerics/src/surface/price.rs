@@ -5,6 +5,7 @@
 use crate::machine::price::{Price, Sizes};
 use crate::patches::MAX_LOCAL_DIMENSION;
 use crate::patches::price::{choosing_flops, regression_flops};
+use crate::points::duplicates::merging_flops;
 use crate::points::quadric::{n_coefficients, n_quadric_neighbours};
 use crate::points::sampling::{sampling_flops, sampling_price};
 use crate::points::thinning::n_coarse;
@@ -95,18 +96,26 @@ pub(crate) fn geometry_price(asked: AskedOfSurface, sizes: Sizes) -> Price {
 }
 
 /// The price of the regions of a tile, each point of which may be a region of its own: its normal, its
-/// edges, and the sums over it.
+/// neighbours with edges to them, and the sums over it.
 pub fn regions_price(n_points: usize, dimension: usize) -> Price {
     let edges = 4 * (2 * dimension + 2);
-    Price::of_numbers(n_points.saturating_mul(12 + 6 * dimension + edges), 1e3 * n_points as f64)
+    Price::of_numbers(n_points.saturating_mul(12 + 6 * dimension + edges), 1e5 * n_points as f64)
 }
 
-/// The price of choosing a coarse part of a cloud, with its kernel.
-pub fn coarse_price(n_points: usize, dimension: usize) -> Price {
-    let halvings = (n_points as f64).log2().max(1.0) * (n_points * dimension) as f64;
-    let of_coarse = sampling_price(n_coarse(n_points), dimension);
-    Price::of_numbers(n_points, 8.0 * halvings).and(of_coarse)
+/// The price of choosing a coarse part of a cloud, of `count` points or as many as by default, with its
+/// kernel. Its duplicates are merged.
+pub fn coarse_price(n_points: usize, dimension: usize, count: Option<usize>) -> Price {
+    let count = count.unwrap_or_else(|| n_coarse(n_points)).min(n_points);
+    let halvings = (count as f64).log2().max(1.0) * n_points as f64;
+    let of_coarse = sampling_price(count, dimension);
+    let merging = Price::of_numbers(count.saturating_mul(2 * dimension + 8), merging_flops(count));
+    let halving = Price::of_numbers(n_points, FLOPS_PER_HALVED * dimension as f64 * halvings);
+    halving.and(merging).and(of_coarse)
 }
+
+/// Flops for a coordinate of a point each time that a cloud is halved: two searches for the farthest point,
+/// a mean, and a selection. An estimate.
+const FLOPS_PER_HALVED: f64 = 100.0;
 
 /// The price of normals and curvatures by local regressions at queries.
 pub(crate) fn local_geometry_price(sizes: Sizes) -> Price {
@@ -195,6 +204,14 @@ mod tests {
             let of = |has_deviations| geometry_flops(asked(has_deviations), sizes);
             assert_eq!(of(true) > of(false), d <= MAX_LOCAL_DIMENSION, "d = {d}");
         }
+    }
+
+    #[test]
+    fn coarse_clouds_cost_what_their_points_do() {
+        let flops = |count: usize| coarse_price(1_000_000, 3, Some(count)).flops;
+        assert!(flops(1_000_000) > 5.0 * flops(1000));
+        assert_eq!(coarse_price(1_000_000, 3, None).flops, flops(n_coarse(1_000_000)));
+        assert_eq!(flops(usize::MAX), flops(1_000_000));
     }
 
     #[test]

@@ -42,6 +42,9 @@ pub trait HasCloud {
     /// The kernel of the request, its noise, and its solver.
     fn process(&self) -> GivenProcess<'_>;
 
+    /// Whether points that coincide may be merged.
+    fn may_merge(&self) -> bool;
+
     /// The cloud of the surface, where it may differ from that of the values.
     fn surface_cloud(&self) -> Option<&CloudRef> {
         None
@@ -131,6 +134,10 @@ macro_rules! request {
 
             fn cloud_mut(&mut self) -> &mut $crate::http::fields::CloudRef {
                 &mut self.cloud
+            }
+
+            fn may_merge(&self) -> bool {
+                self.duplicates == Some($crate::http::fields::DuplicatePolicy::Merge)
             }
 
             fn process(&self) -> $crate::http::fields::GivenProcess<'_> {

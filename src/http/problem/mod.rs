@@ -235,6 +235,9 @@ impl Problem {
                 at(Slug::InvalidRequest, &Pointers::entry(pointers.regularization, point))
             }
             E::InvalidTile { tile, .. } => at(Slug::InvalidRequest, &Pointers::entry("/tiles", tile)),
+            E::InvalidRegion { tile, region, .. } => {
+                at(Slug::InvalidRequest, &format!("/tiles/{tile}/regions/{region}"))
+            }
             E::InvalidLink { link } => at(Slug::InvalidRequest, &Pointers::entry("/links", link)),
             E::InvalidVariation { entry, .. } => at(Slug::InvalidRequest, &Pointers::entry("/vary", entry)),
             E::KernelNotPositiveDefinite { .. } => {

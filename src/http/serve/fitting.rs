@@ -162,7 +162,7 @@ impl Fitting<'_> {
     /// Returns the work and memory of a request, as far as they can be foreseen.
     pub fn outlook(&self, main: &FitPlan, surface: Option<&FitPlan>, cost: Cost) -> Outlook {
         let wanted = Wanted::of(main, surface, cost);
-        let mut outlook = Outlook { flops: cost.work.flops, n_bytes: n_bytes_of_work(cost), is_cached: true };
+        let mut outlook = Outlook { flops: cost.flops(), n_bytes: n_bytes_of_work(cost), is_cached: true };
         for (missing, price, _) in self.missing(&wanted) {
             let parts = [(missing.solver, price.expected), (missing.surface, price.surface)];
             for (_, price) in parts.into_iter().filter(|(is_missing, _)| *is_missing) {

@@ -20,7 +20,7 @@ use super::report::AnswerHeaders;
 use super::sampling::{find_lacking, find_landmarks};
 use crate::config::Config;
 use crate::http::compute::{Admission, JobObserver, Work, is_light};
-use crate::http::fields::HasCloud;
+use crate::http::fields::{CloudRef, DuplicatePolicy, HasCloud};
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::http::state::app::App;
@@ -33,6 +33,7 @@ use crate::store::budget::Reservation;
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::CloudId;
 use gramian_numerics::error::SolverKind;
+use gramian_numerics::points::duplicates::merging_flops;
 
 /// A request with the operation that it is sent to.
 pub trait Declared {
@@ -152,7 +153,7 @@ async fn compute<O: Operation>(
     let outlook = fitting.outlook(&plan.main, plan.surface.as_ref(), plan.cost);
     within_deadline(app, admission, admission.set_work(outlook.as_work(O::NAME)))?;
     let (fits, memory) = fitting.fits(&plan.main, plan.surface.as_ref(), plan.cost, &mut report).await?;
-    let flops = plan.cost.work.flops;
+    let flops = plan.cost.flops();
     let job = move |observer: &JobObserver| answer::<O>(*plan, &fits, memory, report, wanted, observer);
     app.compute.run(admission, flops, job).await?.0
 }
@@ -282,8 +283,8 @@ async fn prepare<O: Operation>(
         let (request, memory) = parsed(intake, &shared.app, observer)?;
         let received = Received { request, memory, known: Known::default() };
         let absent = ids_not_in_memory(&shared.app, shared.admission.owner, &received.request);
-        if !absent.is_empty() {
-            return Ok(Parsed::NotInMemory(Box::new(received), absent));
+        if !absent.is_empty() || !is_light(planning_flops(&shared, &received)) {
+            return Ok(Parsed::Unplanned(Box::new(received), absent));
         }
         planned(&shared, received, observer)
     };
@@ -291,7 +292,7 @@ async fn prepare<O: Operation>(
     let planned = loop {
         let received = match parsed {
             Parsed::Planned(planned) => break planned,
-            Parsed::NotInMemory(mut received, ids) => {
+            Parsed::Unplanned(mut received, ids) => {
                 for id in ids {
                     received.known.clouds.extend(find_cloud(app, admission, id).await?);
                 }
@@ -302,9 +303,9 @@ async fn prepare<O: Operation>(
                 received
             }
         };
-        let shared = call.clone();
+        let (shared, flops) = (call.clone(), planning_flops(call, &received));
         let plan = move |observer: &JobObserver| planned(&shared, *received, observer);
-        parsed = app.compute.run(admission, 0.0, plan).await?.0?;
+        parsed = app.compute.run(admission, flops, plan).await?.0?;
     };
     let (mut plan, memory, fresh) = match planned {
         Planned::Done(prepared) => return Ok(prepared),
@@ -313,8 +314,9 @@ async fn prepare<O: Operation>(
     while let Some(fit) = lacking_mut(&mut plan) {
         find_lacking(app, admission, fit).await?;
     }
-    let job = move |_: &JobObserver| resolve(*plan, memory, fresh);
-    app.compute.run(admission, 0.0, job).await?.0.map(|plan| Prepared::Ready(Box::new(plan)))
+    let flops = resolving_flops(&plan);
+    let job = move |observer: &JobObserver| resolve(*plan, Held { memory, fresh }, observer);
+    app.compute.run(admission, flops, job).await?.0.map(|plan| Prepared::Ready(Box::new(plan)))
 }
 
 /// Plans a parsed request.
@@ -337,10 +339,10 @@ fn planned<O: Operation>(
     if lacking_mut(&mut plan).is_some() {
         return Ok(Parsed::Planned(Planned::Lacking(Box::new(plan), memory, fresh)));
     }
-    let plan = resolve(plan, memory, fresh)?;
+    let plan = resolve(plan, Held { memory, fresh }, observer)?;
     let mut report = AnswerHeaders::parsed_in(began.elapsed(), plan.main.stored.id);
     let fitting = Fitting { app, admission, has_surface: plan.has_surface };
-    let wanted = wanted.filter(|_| is_light(plan.cost.work.flops));
+    let wanted = wanted.filter(|_| is_light(plan.cost.flops()));
     let at_hand = wanted.and_then(|wanted| {
         let found = fitting.at_hand(&plan.main, plan.surface.as_ref(), plan.cost, &mut report)?;
         Some((found, wanted))
@@ -349,7 +351,7 @@ fn planned<O: Operation>(
         None => Planned::Done(Prepared::Ready(Box::new(plan))),
         Some(((fits, memory), wanted)) => {
             let fresh = plan.fresh.clone();
-            let work = Work { operation: O::NAME, is_cached: true, flops: plan.cost.work.flops };
+            let work = Work { operation: O::NAME, is_cached: true, flops: plan.cost.flops() };
             let began = Instant::now();
             let answered = answer::<O>(plan, &fits, memory, report, wanted, observer)?;
             admission.did_at_once(work, began.elapsed());
@@ -369,6 +371,32 @@ fn ids_not_in_memory<O: Operation>(app: &App, owner: Owner, request: &O) -> Vec<
     ids.filter(|&id| !is_at_hand(id)).collect()
 }
 
+/// Flops of planning a request, beside parsing it: of merging points that coincide.
+fn planning_flops<O: Operation>(call: &Call, received: &Received<O>) -> f64 {
+    if !received.request.may_merge() {
+        return 0.0;
+    }
+    let n_points = |cloud: &CloudRef| {
+        let id = cloud.id.as_deref().and_then(CloudId::parse);
+        let of_id = |id| {
+            let found = received.known.clouds.iter().find(|cloud| cloud.id == id).cloned();
+            found.or_else(|| call.app.clouds.get(call.admission.owner, id))
+        };
+        let registered = cloud.registered.clone().or_else(|| id.and_then(of_id));
+        let of_points = || cloud.points.as_ref().map(|points| points.n_rows);
+        registered.map(|cloud| cloud.cloud.n_points()).or_else(of_points).unwrap_or_default()
+    };
+    let of_surface = received.request.surface_cloud().map_or(0, n_points);
+    merging_flops(n_points(received.request.cloud())) + merging_flops(of_surface)
+}
+
+/// Flops of completing a plan: of merging points that coincide.
+fn resolving_flops<W>(plan: &Plan<W>) -> f64 {
+    let fits = [Some(&plan.main), plan.surface.as_ref()].into_iter().flatten();
+    let merged = fits.map(PlannedFit::on).filter(|on| on.duplicates == DuplicatePolicy::Merge);
+    merged.map(|on| merging_flops(on.n_points())).sum()
+}
+
 /// A parsed request with its memory, and what is known of its clouds.
 struct Received<O> {
     request: O,
@@ -379,8 +407,9 @@ struct Received<O> {
 /// A request whose body was parsed.
 enum Parsed<O: Operation> {
     Planned(Planned<O::Work>),
-    /// Some clouds of the request have to be read from the store before it can be planned.
-    NotInMemory(Box<Received<O>>, Vec<CloudId>),
+    /// Some clouds of the request have to be read from the store before it can be planned, or planning is
+    /// no light work.
+    Unplanned(Box<Received<O>>, Vec<CloudId>),
     /// `auto` chooses a solver by a number of landmarks that is not known yet.
     NotProbed(Box<Received<O>>, Box<LandmarkProbe>),
 }
@@ -398,15 +427,18 @@ fn lacking_mut<W>(plan: &mut Plan<W>) -> Option<&mut PlannedFit> {
     fits.find(|fit| fit.lack().is_some())
 }
 
-fn resolve<W>(
-    plan: Plan<W>,
-    intake: Reservation,
+/// What a request holds while it is planned: its memory, and its clouds that are only in memory.
+struct Held {
+    memory: Reservation,
     fresh: Vec<Arc<RegisteredCloud>>,
-) -> Result<Resolved<W>, Problem> {
-    let main = plan.main.resolve()?;
-    let surface = plan.surface.map(PlannedFit::resolve).transpose()?;
+}
+
+fn resolve<W>(plan: Plan<W>, held: Held, observer: &JobObserver) -> Result<Resolved<W>, Problem> {
+    let main = plan.main.resolve(observer)?;
+    let surface = plan.surface.map(|surface| surface.resolve(observer)).transpose()?;
     let Plan { has_surface, work, cost, .. } = plan;
-    Ok(Resolved { main, surface, has_surface, work, cost, intake, fresh })
+    let Held { memory, fresh } = held;
+    Ok(Resolved { main, surface, has_surface, work, cost, intake: memory, fresh })
 }
 
 /// Bytes that a request holds until it is answered: values, queries, and clouds that the cache may drop.

@@ -69,7 +69,7 @@ impl LocalKriging {
         if !has_variance(self.system.kernel(), 2) {
             return Ok(None);
         }
-        let sample = queries.select(&thinned_points(queries, COMPARED));
+        let sample = queries.select(&thinned_points(queries, COMPARED, observer)?);
         let mut least = self.uncertainty(&sample, order, observer)?;
         let (mut surest, mut size) = (None, FACTOR);
         while self.system.n_points() / size > 2 * NEIGHBOURS {

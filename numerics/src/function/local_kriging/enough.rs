@@ -38,7 +38,7 @@ impl LocalKriging {
         if self.system.n_points() <= NEIGHBOURS {
             return Ok(None);
         }
-        let sample = queries.select(&thinned_points(queries, LOOKED_AT));
+        let sample = queries.select(&thinned_points(queries, LOOKED_AT, observer)?);
         let by = |n_neighbours: usize| {
             let order = JetOrder::Value;
             let request = KrigingRequest { order, has_variances: true, has_deviations: false, trend };

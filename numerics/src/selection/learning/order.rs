@@ -80,7 +80,7 @@ impl Order {
             let all = Conditional::whole(halves.iter().flat_map(|half| by_places(cloud, half)).collect());
             return Ok(Self { searched: vec![all], deep: Vec::new() });
         }
-        let sample = sample(observed);
+        let sample = sample(observed, observer)?;
         let halves = halves(observed, &sample);
         let mut earlier = sample.clone();
         let mut found = Self { searched: vec![Conditional::whole(sample)], deep: Vec::new() };
@@ -106,16 +106,19 @@ impl Order {
 }
 
 /// Returns the sample: groups of near points, spread over the cloud.
-fn sample(observed: &Observed<'_>) -> Vec<usize> {
+///
+/// # Errors
+/// `NumericsError::Cancelled`.
+fn sample(observed: &Observed<'_>, observer: &dyn Observer) -> Result<Vec<usize>> {
     let cloud = observed.cloud;
-    let centres = thinned_points(cloud, MAX_SAMPLE / TOGETHER);
+    let centres = thinned_points(cloud, MAX_SAMPLE / TOGETHER, observer)?;
     let around = |&point: &usize| {
         observed.sampling.neighbours().nearest(cloud.point(point), TOGETHER).into_iter().map(|n| n.point)
     };
     let mut points: Vec<usize> = centres.iter().flat_map(around).collect();
     points.sort_unstable();
     points.dedup();
-    points
+    Ok(points)
 }
 
 /// Splits the points outside of the sample into two halves, each spread over the cloud. Of every two near

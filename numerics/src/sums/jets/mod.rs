@@ -293,11 +293,17 @@ impl Jets {
 ///
 /// # Errors
 /// [`NumericsError::KernelNotSmooth`] with the first query that is a point of the cloud.
-pub(crate) fn check_smooth_at(cloud: &Cloud, kernel: &Kernel, queries: &Cloud) -> Result<()> {
+/// [`NumericsError::Cancelled`].
+pub(crate) fn check_smooth_at(
+    cloud: &Cloud,
+    kernel: &Kernel,
+    queries: &Cloud,
+    observer: &dyn Observer,
+) -> Result<()> {
     if !kernel.has_kink() {
         return Ok(());
     }
-    let positions = Positions::of(cloud);
+    let positions = Positions::of(cloud, observer)?;
     match queries.points().enumerate().find_map(|(query, x)| Some((query, positions.find(x)?))) {
         Some((query, point)) => Err(NumericsError::KernelNotSmooth { query, point }),
         None => Ok(()),

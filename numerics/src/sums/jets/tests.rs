@@ -174,10 +174,10 @@ fn kinked_kernels_are_refused_at_their_points_only() {
     let mut coordinates = vec![0.1, 0.2, 0.3];
     coordinates.extend_from_slice(cloud.point(7));
     let queries = Cloud::new(coordinates, 3).unwrap();
-    let refusal = check_smooth_at(&cloud, &kernel, &queries);
+    let refusal = check_smooth_at(&cloud, &kernel, &queries, &Unobserved);
     assert_eq!(refusal, Err(NumericsError::KernelNotSmooth { query: 1, point: 7 }));
     let smooth = Kernel::new(crate::kernel::Family::Gauss, 1.0, 1.0).unwrap();
-    assert_eq!(check_smooth_at(&cloud, &smooth, &queries), Ok(()));
+    assert_eq!(check_smooth_at(&cloud, &smooth, &queries, &Unobserved), Ok(()));
 }
 
 #[test]

@@ -48,9 +48,10 @@ impl CoarseCloud {
         noise: f64,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
-        let mut points = thinned_points(cloud, count.unwrap_or_else(|| n_coarse(cloud.n_points())));
+        let count = count.unwrap_or_else(|| n_coarse(cloud.n_points()));
+        let mut points = thinned_points(cloud, count, observer)?;
         let mut coarse = cloud.select(&points);
-        if let Some((merged, merge)) = Merge::duplicates_of(&coarse) {
+        if let Some((merged, merge)) = Merge::duplicates_of(&coarse, observer)? {
             points = (0..merged.n_points()).map(|group| points[merge.first_point(group)]).collect();
             coarse = merged;
         }
@@ -73,12 +74,12 @@ impl CoarseCloud {
         let system = System::new(Arc::new(self.cloud), self.kernel, regularization)?;
         let solver = Arc::new(Solver::dense(system, observer)?);
         let signature = Interpolant::signature(solver, observer)?;
-        let runs = Runs::of(cloud, REACH * self.spacing)?;
+        let runs = Runs::of(cloud, REACH * self.spacing, observer)?;
         let mut directions = if runs.ranges.len() * WORTH_CONTINUING > cloud.n_points() {
             signature.at(cloud, JetOrder::Gradient, observer)?.gradients()
         } else {
             let jets = signature.at(&runs.middles, JetOrder::Hessian, observer)?;
-            runs.continued(cloud, &jets)
+            runs.continued(cloud, &jets, observer)?
         };
         directions.iter_mut().for_each(|g| *g = -*g);
         Ok(directions)
@@ -111,7 +112,7 @@ mod tests {
         let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
         let ordered = TreeOrder::of(&cloud, sampling).unwrap();
         let coarse = || CoarseCloud::of(&ordered.cloud, Some(300), 0.0, &Unobserved).unwrap();
-        let runs = Runs::of(&ordered.cloud, REACH * coarse().spacing).unwrap();
+        let runs = Runs::of(&ordered.cloud, REACH * coarse().spacing, &Unobserved).unwrap();
         assert!(runs.ranges.len() * WORTH_CONTINUING < 20_000, "{}", runs.ranges.len());
         let continued = coarse().directions_at(&ordered.cloud, &Unobserved).unwrap();
         for (x, direction) in ordered.cloud.points().zip(continued.chunks_exact(3)).step_by(971) {

@@ -6,6 +6,7 @@ pub(crate) mod smoothed;
 pub mod sure;
 mod tree_order;
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -437,12 +438,15 @@ impl PatchGeometry {
         }
     }
 
-    /// The feet of the points of the cloud that this is the geometry at, `[n, d]`: `x − hν`. Points without a
+    /// The feet `x − hν` of some points of the cloud that this is the geometry at, `[m, d]`. Points without a
     /// regression stay where they are.
-    pub(crate) fn feet(&self, cloud: &Cloud) -> Vec<f64> {
-        let rows = cloud.points().zip(self.normals.chunks_exact(cloud.dimension())).zip(&self.heights);
-        rows.flat_map(|((x, normal), height)| x.iter().zip(normal).map(move |(x, c)| x - height * c))
-            .collect()
+    pub(crate) fn feet(&self, cloud: &Cloud, points: Range<usize>) -> Vec<f64> {
+        let d = cloud.dimension();
+        let foot = |point: usize| {
+            let (normal, height) = (&self.normals[point * d..][..d], self.heights[point]);
+            cloud.point(point).iter().zip(normal).map(move |(x, c)| x - height * c)
+        };
+        points.flat_map(foot).collect()
     }
 
     /// The same of ordered points in the order in which they were given.

@@ -4,8 +4,12 @@ use std::ops::Range;
 
 use crate::error::Result;
 use crate::machine::small::{Small, zeros};
+use crate::observer::{Observer, for_each};
 use crate::points::cloud::{Cloud, squared_distance};
 use crate::sums::jets::Jets;
+
+/// Points of ranges that are looked at between two checkpoints: some milliseconds.
+const CHECKED_AT_ONCE: usize = 1 << 18;
 
 /// The points of a cloud in runs, each within a ball.
 pub(super) struct Runs {
@@ -18,11 +22,17 @@ impl Runs {
     /// Halves the points until every run is within `reach` of its middle.
     ///
     /// # Errors
-    /// None: means of points are points. The type of a cloud checks them again.
-    pub(super) fn of(cloud: &Cloud, reach: f64) -> Result<Self> {
+    /// [`crate::error::NumericsError::Cancelled`]. Means of points are points.
+    pub(super) fn of(cloud: &Cloud, reach: f64, observer: &dyn Observer) -> Result<Self> {
         let (mut ranges, mut middles) = (Vec::new(), Vec::new());
         let mut pending: Vec<Range<usize>> = std::iter::once(0..cloud.n_points()).collect();
+        let mut n_seen = CHECKED_AT_ONCE;
         while let Some(range) = pending.pop() {
+            n_seen += range.len();
+            if n_seen >= CHECKED_AT_ONCE {
+                observer.checkpoint()?;
+                n_seen = 0;
+            }
             let middle = range.start.midpoint(range.end);
             match mean_within(cloud, range.clone(), reach) {
                 Some(mean) => {
@@ -37,10 +47,18 @@ impl Runs {
 
     /// Gradients at the points of the cloud, `[n, d]`, from derivatives at the middles:
     /// `∇u(c) + D²u(c)(x − c)`.
-    pub(super) fn continued(&self, cloud: &Cloud, at_middles: &Jets) -> Vec<f64> {
+    ///
+    /// # Errors
+    /// [`crate::error::NumericsError::Cancelled`].
+    pub(super) fn continued(
+        &self,
+        cloud: &Cloud,
+        at_middles: &Jets,
+        observer: &dyn Observer,
+    ) -> Result<Vec<f64>> {
         let d = cloud.dimension();
         let mut gradients = Vec::with_capacity(cloud.n_points() * d);
-        for (run, range) in self.ranges.iter().enumerate() {
+        for_each(self.ranges.iter().enumerate(), observer, |(run, range)| {
             let (middle, gradient) = (self.middles.point(run), at_middles.gradient(run));
             let hessian = at_middles.hessian(run);
             for x in range.clone().map(|point| cloud.point(point)) {
@@ -49,8 +67,8 @@ impl Runs {
                 gradients
                     .extend(rows.map(|(g, row)| g + row.iter().zip(&step).map(|(h, s)| h * s).sum::<f64>()));
             }
-        }
-        gradients
+        })?;
+        Ok(gradients)
     }
 }
 
@@ -75,13 +93,15 @@ fn mean_within(cloud: &Cloud, range: Range<usize>, reach: f64) -> Option<Small> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::fibonacci_sphere;
+    use crate::error::NumericsError;
+    use crate::observer::Unobserved;
+    use crate::testing::{StopAt, fibonacci_sphere};
 
     #[test]
     fn every_point_is_in_one_run_near_its_middle() {
         let cloud = fibonacci_sphere(500);
         for reach in [0.0, 0.05, 0.5, 3.0] {
-            let runs = Runs::of(&cloud, reach).unwrap();
+            let runs = Runs::of(&cloud, reach, &Unobserved).unwrap();
             let points: Vec<usize> = runs.ranges.iter().flat_map(Clone::clone).collect();
             assert_eq!(points, (0..500).collect::<Vec<_>>());
             for (range, middle) in runs.ranges.iter().zip(runs.middles.points()) {
@@ -89,6 +109,20 @@ mod tests {
                 assert!(distances.all(|distance| distance <= reach * reach));
             }
         }
-        assert_eq!(Runs::of(&cloud, 3.0).unwrap().ranges.len(), 1);
+        assert_eq!(Runs::of(&cloud, 3.0, &Unobserved).unwrap().ranges.len(), 1);
+    }
+
+    #[test]
+    fn runs_have_checkpoints_as_points_are_many() {
+        let n_checkpoints = |n: usize| {
+            let cloud = Cloud::new((0..n).map(|i| i as f64).collect(), 1).unwrap();
+            let observer = StopAt::never();
+            Runs::of(&cloud, 0.1, &observer).unwrap();
+            observer.n_checkpoints()
+        };
+        assert!(n_checkpoints(600_000) > 20 && n_checkpoints(1000) < 3);
+        let cloud = fibonacci_sphere(500);
+        let outcome = Runs::of(&cloud, 0.1, &StopAt::checkpoint(0)).map(|runs| runs.ranges.len());
+        assert_eq!(outcome, Err(NumericsError::Cancelled));
     }
 }

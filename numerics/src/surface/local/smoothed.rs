@@ -49,7 +49,7 @@ impl Smoothed {
         if noise < NOISY * sampling.scales().spacing || !are_like_noise(&geometry.heights) {
             return Ok(None);
         }
-        let cloud = Cloud::new(geometry.feet(cloud), cloud.dimension())?;
+        let cloud = Cloud::new(geometry.feet(cloud, 0..cloud.n_points()), cloud.dimension())?;
         let sampling = Sampling::of(&cloud, observer)?;
         Ok(Some(Self { cloud, sampling }))
     }

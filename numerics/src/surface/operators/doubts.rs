@@ -91,7 +91,7 @@ impl Judged<'_> {
         let findings = Findings { geometry: self.geometry, found: self.found, kernel: &kernel, factor };
         let k = findings.n_components();
         let places = self.queries.select(&regular);
-        let chosen = thinned_points(&places, findings.n_judged());
+        let chosen = thinned_points(&places, findings.n_judged(), observer)?;
         let judged: Vec<usize> = chosen.iter().map(|&at| regular[at]).collect();
         let functionals = self.functionals(operator, &judged);
         let errors = self.errors(&functionals, observer)?;

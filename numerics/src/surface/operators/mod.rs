@@ -152,7 +152,7 @@ fn operator_matrix(
 ) -> Result<Vec<f64>> {
     let (cloud, kernel) = (solver.cloud(), solver.kernel());
     cloud.check_same_dimension(queries)?;
-    check_smooth_at(cloud, kernel, queries)?;
+    check_smooth_at(cloud, kernel, queries, observer)?;
     observer.enter(Stage::Evaluate);
     let (n, m) = (cloud.n_points(), queries.n_points());
     let n_rows = operator.n_components(cloud.dimension()) * m;

@@ -12,6 +12,7 @@ use crate::store::Owner;
 use crate::store::clouds::RegisteredCloud;
 use gramian_numerics::machine::price::Price;
 use gramian_numerics::model::choose::AutoReason;
+use gramian_numerics::observer::Observer;
 use gramian_numerics::points::sampling::Scales;
 pub use resolved::FitPlan;
 pub use surface::{PlannedSurface, SurfaceSource};
@@ -65,10 +66,10 @@ impl PlannedFit {
     ///
     /// # Errors
     /// Returns a [`Problem`] with a pointer to the field.
-    pub fn resolve(self) -> Result<FitPlan, Problem> {
+    pub fn resolve(self, observer: &dyn Observer) -> Result<FitPlan, Problem> {
         match self {
-            Self::Values(fit) => fit.resolve(),
-            Self::Surface(fit) => fit.resolve(),
+            Self::Values(fit) => fit.resolve(observer),
+            Self::Surface(fit) => fit.resolve(observer),
         }
     }
 }
@@ -122,7 +123,15 @@ pub struct Cost {
     pub n_held: usize,
 }
 
+/// Flops for a number of an answer, which is computed from others and copied: 5 ns.
+const FLOPS_PER_NUMBER: f64 = 100.0;
+
 impl Cost {
+    /// Flops of the work and of its answer.
+    pub fn flops(&self) -> f64 {
+        self.work.flops + FLOPS_PER_NUMBER * self.n_numbers as f64
+    }
+
     /// Bytes of the answer as numbers, of a second copy during assembly, and of intermediate results.
     pub fn n_bytes(&self) -> usize {
         self.n_numbers.saturating_mul(2 * size_of::<f64>()).saturating_add(self.work.n_bytes)

@@ -14,6 +14,7 @@ use gramian_numerics::model::Recipe;
 use gramian_numerics::model::choose::AutoReason;
 use gramian_numerics::model::price::CloudSize;
 use gramian_numerics::model::price::MakingPrice;
+use gramian_numerics::observer::Observer;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::duplicates::Merge;
 use gramian_numerics::selection::Learned;
@@ -34,6 +35,12 @@ pub struct FitPlan {
     pub key: FitKey,
     pub pointers: Pointers,
     pub process: Process,
+}
+
+/// A recipe with the reason for its solver, where `auto` chose one.
+pub(super) struct ChosenRecipe {
+    pub recipe: Recipe,
+    pub reason: Option<AutoReason>,
 }
 
 /// Assumed process of the values, besides the recipe.
@@ -60,11 +67,12 @@ impl FitPlan {
     /// Merges duplicates if the request wants that, and derives the key of the fit.
     pub(super) fn of(
         on: FittedCloud,
-        recipe: Recipe,
-        reason: Option<AutoReason>,
+        chosen: ChosenRecipe,
         process: Process,
+        observer: &dyn Observer,
     ) -> Result<Self, Problem> {
         let FittedCloud { owner, stored, pointers, duplicates, tolerance } = on;
+        let ChosenRecipe { recipe, reason } = chosen;
         let recipe = recipe.with_tolerance(tolerance);
         let is_singular_at_duplicates = match recipe.process() {
             None => false,
@@ -75,7 +83,9 @@ impl FitPlan {
             }
         };
         let merges = duplicates == DuplicatePolicy::Merge && is_singular_at_duplicates;
-        let merged = if merges { Merge::duplicates_of(&stored.cloud) } else { None };
+        let refused = |error| Problem::from_numerics(error, pointers);
+        let merged =
+            if merges { Merge::duplicates_of(&stored.cloud, observer).map_err(refused)? } else { None };
         let key = FitKey::of(owner, stored.id, &recipe, merged.is_some());
         let (fitted, merge) = match merged {
             None => (stored.cloud.clone(), None),

@@ -1,6 +1,6 @@
 //! Fit of the surface that a cloud samples.
 
-use super::resolved::Process;
+use super::resolved::{ChosenRecipe, Process};
 use super::{FitPlan, FittedCloud, Lack};
 use crate::http::fields::kernel::PlannedKernel;
 use crate::http::problem::Problem;
@@ -8,6 +8,7 @@ use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::defaults::{Purpose, default_fit};
 use gramian_numerics::model::choose::AutoReason;
 use gramian_numerics::model::{Recipe, ScaledProcess};
+use gramian_numerics::observer::Observer;
 use gramian_numerics::sums::regularization::Regularization;
 use gramian_numerics::surface::local::Learning;
 
@@ -49,7 +50,7 @@ impl PlannedSurface {
         (follows && self.on.stored.noise().is_none()).then_some(Lack::Noise)
     }
 
-    pub(super) fn resolve(self) -> Result<FitPlan, Problem> {
+    pub(super) fn resolve(self, observer: &dyn Observer) -> Result<FitPlan, Problem> {
         let Self { on, choice } = self;
         let refuse = |error| Problem::from_numerics(error, on.pointers);
         let (solver, kernel, regularization, purpose) = match choice {
@@ -57,7 +58,8 @@ impl PlannedSurface {
                 (solver, kernel, regularization, purpose)
             }
             SurfaceSource::Regressions { reason, learning } => {
-                return FitPlan::of(on, Recipe::LocalSurface { learning }, reason, Process::default());
+                let recipe = ChosenRecipe { recipe: Recipe::LocalSurface { learning }, reason };
+                return FitPlan::of(on, recipe, Process::default(), observer);
             }
         };
         let scaled = match kernel {
@@ -74,6 +76,7 @@ impl PlannedSurface {
         };
         let ScaledProcess { kernel, regularization, scale } = scaled;
         let recipe = Recipe::of_values(solver, kernel, regularization);
-        FitPlan::of(on, recipe, None, Process { scale, ..Process::default() })
+        let recipe = ChosenRecipe { recipe, reason: None };
+        FitPlan::of(on, recipe, Process { scale, ..Process::default() }, observer)
     }
 }

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::resolved::Process;
+use super::resolved::{ChosenRecipe, Process};
+
 use super::{FitPlan, FittedCloud, Lack};
 use crate::http::fields::kernel::PlannedKernel;
 use crate::http::problem::Problem;
@@ -110,7 +111,7 @@ impl PlannedValues {
         })
     }
 
-    pub(super) fn resolve(self) -> Result<FitPlan, Problem> {
+    pub(super) fn resolve(self, observer: &dyn Observer) -> Result<FitPlan, Problem> {
         let Self { on, solver, reason, mean, values, learned, .. } = self;
         let refuse = |error| Problem::from_numerics(error, on.pointers);
         let is_learned = self.kernel.is_none() && learned.is_some();
@@ -128,7 +129,8 @@ impl PlannedValues {
         let ScaledProcess { kernel, regularization, scale } = scaled;
         let recipe = Recipe::of_values(solver, kernel, regularization);
         let process = Process { scale, is_learned, mean, values, learned };
-        FitPlan::of(on, recipe, reason, process)
+        let recipe = ChosenRecipe { recipe, reason };
+        FitPlan::of(on, recipe, process, observer)
     }
 }
 

@@ -155,13 +155,16 @@ fn first_elsewhere(sites: &Cloud, cloud: &Cloud) -> Option<usize> {
     // All coordinates are finite.
     let along = |site: usize, x: &[f64]| sites.point(site).partial_cmp(x).unwrap_or(Ordering::Equal);
     order.sort_by(|&a, &b| along(a, sites.point(b)));
-    let mut is_there = vec![false; sites.n_points()];
+    // Sites that coincide are looked for once. The first of them comes first.
+    order.dedup_by(|later, first| along(*later, sites.point(*first)).is_eq());
+    let mut is_there = vec![false; order.len()];
     for x in cloud.points() {
-        let start = order.partition_point(|&site| along(site, x).is_lt());
-        let here = order[start..].iter().take_while(|&&site| along(site, x).is_eq());
-        here.for_each(|&site| is_there[site] = true);
+        let at = order.partition_point(|&site| along(site, x).is_lt());
+        if order.get(at).is_some_and(|&site| along(site, x).is_eq()) {
+            is_there[at] = true;
+        }
     }
-    is_there.iter().position(|is_there| !is_there)
+    order.into_iter().zip(is_there).filter(|(_, is_there)| !is_there).map(|(site, _)| site).min()
 }
 
 /// Returns 404 for an id that names no cloud of this owner.

@@ -25,6 +25,7 @@ use gramian_numerics::machine::normal::{cumulative, quantile};
 use gramian_numerics::machine::price::Sizes;
 use gramian_numerics::model::price::{PosteriorAsked, posterior_price};
 use gramian_numerics::model::{EachAt, JetRequest, ValuesAt};
+use gramian_numerics::observer::Observer;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::sums::jets::JetOrder;
 
@@ -283,8 +284,14 @@ impl Found {
         Ok(Self {
             variances: bands.variances(Q::Variance, 0.0),
             observation_variances: bands.variances(Q::ObservationVariance, alpha),
-            quantiles: bands.quantiles().map(|found| Array::new(found, &shape(&[asked.n_quantiles(), m]))),
-            exceedance_probabilities: bands.exceedances(alpha).map(|found| Array::new(found, &shape(&[m]))),
+            quantiles: bands
+                .quantiles(observer)
+                .map_err(refused)?
+                .map(|found| Array::new(found, &shape(&[asked.n_quantiles(), m]))),
+            exceedance_probabilities: bands
+                .exceedances(alpha, observer)
+                .map_err(refused)?
+                .map(|found| Array::new(found, &shape(&[m]))),
             means: Array::new(jets.values, &shape(&[m])),
             covariance: covariance
                 .filter(|_| asked.wants(Q::Covariance))
@@ -314,6 +321,9 @@ fn draws(
     Ok(all)
 }
 
+/// Probabilities that are computed between two checkpoints: about a millisecond.
+const AT_ONCE: usize = 1 << 14;
+
 /// Normal distributions at the queries: means `[k, m]` and variances `[m]`.
 struct Bands<'a> {
     asked: &'a Asked,
@@ -329,23 +339,35 @@ impl Bands<'_> {
     }
 
     /// Returns the quantiles `μ + Φ⁻¹(p)σ`, `[k, q, m]` for q probabilities.
-    fn quantiles(&self) -> Option<Vec<f64>> {
-        let (variances, levels) = (self.variances?, self.asked.quantiles.as_ref()?);
+    ///
+    /// # Errors
+    /// `NumericsError::Cancelled`.
+    fn quantiles(&self, observer: &dyn Observer) -> Result<Option<Vec<f64>>, NumericsError> {
+        let (Some(variances), Some(levels)) = (self.variances, &self.asked.quantiles) else {
+            return Ok(None);
+        };
         let deviations: Vec<f64> = variances.latent.iter().map(|v| v.sqrt()).collect();
         let levels: Vec<f64> = levels.iter().map(|&p| quantile(p)).collect();
-        let of_list = |means: &[f64]| {
-            let rows =
-                levels.iter().map(|z| means.iter().zip(&deviations).map(move |(mean, s)| mean + z * s));
-            rows.flatten().collect::<Vec<f64>>()
-        };
-        Some(self.means.chunks_exact(self.m).flat_map(of_list).collect())
+        let mut quantiles = Vec::with_capacity(self.means.len() * levels.len());
+        for means in self.means.chunks_exact(self.m) {
+            for z in &levels {
+                observer.checkpoint()?;
+                quantiles.extend(means.iter().zip(&deviations).map(|(mean, s)| mean + z * s));
+            }
+        }
+        Ok(Some(quantiles))
     }
 
     /// Returns the probabilities `Φ((μ − t)/√(σ² + α))` of exceeding the threshold t, `[k, m]`.
     ///
     /// Where σ² + α is 0, the probability is 1 for means above the threshold, else 0.
-    fn exceedances(&self, alpha: f64) -> Option<Vec<f64>> {
-        let (variances, threshold) = (self.variances?, self.asked.threshold?);
+    ///
+    /// # Errors
+    /// `NumericsError::Cancelled`.
+    fn exceedances(&self, alpha: f64, observer: &dyn Observer) -> Result<Option<Vec<f64>>, NumericsError> {
+        let (Some(variances), Some(threshold)) = (self.variances, self.asked.threshold) else {
+            return Ok(None);
+        };
         let of_one = |(mean, variance): (&f64, &f64)| {
             let deviation = (variance + alpha).sqrt();
             if deviation > 0.0 {
@@ -354,6 +376,13 @@ impl Bands<'_> {
                 f64::from(u8::from(*mean > threshold))
             }
         };
-        Some(self.means.iter().zip(variances.latent.iter().cycle()).map(of_one).collect())
+        let mut probabilities = Vec::with_capacity(self.means.len());
+        for means in self.means.chunks_exact(self.m) {
+            for (means, variances) in means.chunks(AT_ONCE).zip(variances.latent.chunks(AT_ONCE)) {
+                observer.checkpoint()?;
+                probabilities.extend(means.iter().zip(variances).map(of_one));
+            }
+        }
+        Ok(Some(probabilities))
     }
 }
