@@ -12,6 +12,10 @@ use gramian::http::state::app::App;
 use gramian::signals::Signals;
 use gramian::{server, telemetry};
 use tokio::net::TcpListener;
+use tokio::runtime::{Builder, Runtime};
+
+/// Threads for files of a store. Their memory is part of what the process takes for itself (`memory.rs`).
+const FILE_THREADS: usize = 8;
 
 /// Exit status after a second signal during shutdown: 128 plus the number of SIGINT, as shells report it.
 const INTERRUPTED: i32 = 130;
@@ -54,7 +58,7 @@ fn main() -> ExitCode {
         Some(Command::Key { name }) => make_key(&name).map_err(Into::into),
         None => {
             let log = telemetry::start();
-            let served = serve(config);
+            let served = runtime().map_err(Into::into).and_then(|runtime| runtime.block_on(serve(config)));
             log.mention_losses();
             served
         }
@@ -77,7 +81,14 @@ fn make_key(name: &str) -> Result<(), String> {
     Ok(())
 }
 
-#[tokio::main]
+/// Creates the threads of connections, and a bounded number of threads for files.
+///
+/// By default there may be 512 threads for files. Each holds a stack and a heap of its own, so a few hundred
+/// clients that read results from a directory would take memory that nothing counts.
+fn runtime() -> std::io::Result<Runtime> {
+    Builder::new_multi_thread().enable_all().max_blocking_threads(FILE_THREADS).build()
+}
+
 async fn serve(config: Config) -> Result<(), Box<dyn std::error::Error>> {
     for name in Config::unknown_variables(std::env::vars_os().filter_map(|(name, _)| name.into_string().ok()))
     {

@@ -76,6 +76,39 @@ async fn results_that_nobody_reads_are_within_the_budget() {
     assert!(text.ends_with(&answer.bytes), "{} bytes of {}", text.len(), answer.bytes.len());
 }
 
+/// Returns the bytes of a part of the memory that a process has reserved.
+async fn reserved(process: &Process, part: &str) -> u64 {
+    let metrics = receive(reqwest::Client::new().get(process.url("/metrics"))).await.text().to_owned();
+    let name = format!("gramian_memory_used_bytes{{part=\"{part}\"}} ");
+    let line = metrics.lines().find(|line| line.starts_with(&name)).unwrap();
+    line[name.len()..].parse::<f64>().unwrap() as u64
+}
+
+#[tokio::test]
+async fn unread_results_of_a_directory_take_no_more_than_they_reserve() {
+    let folder = Folder::new("jobs-unread");
+    let flags = [&folder.flags()[..], &["--threads", "2", "--memory-bytes", "402653184"]].concat();
+    let process = Process::start(&flags);
+    let path = format!("{}/result", ask(process.url(MATRIX), &matrix(560), &[]).await);
+    let answer = receive(reqwest::Client::new().get(process.url(&path))).await;
+    assert!(answer.status == 200 && answer.bytes.len() > 6_000_000, "{}", answer.bytes.len());
+    let (resident, work) = (process.peak_resident_bytes(), reserved(&process, "work").await);
+    // All are read from the directory at once.
+    let mut streams: Vec<_> = (0..150).map(|_| TcpStream::connect(process.address()).unwrap()).collect();
+    for stream in &mut streams {
+        write!(stream, "GET {path} HTTP/1.1\r\nHost: test\r\n\r\n").unwrap();
+    }
+    for stream in &mut streams {
+        let mut first = [0; 12];
+        stream.read_exact(&mut first).unwrap();
+        assert_eq!(&first, b"HTTP/1.1 200");
+    }
+    let held = reserved(&process, "work").await - work;
+    let grown = process.peak_resident_bytes() - resident;
+    println!("150 unread results: {grown} bytes more at the peak, {held} reserved");
+    assert!(grown <= held, "{grown} bytes more at the peak, {held} reserved");
+}
+
 /// Returns the value of a metric.
 async fn metric(server: &Server, name: &str) -> f64 {
     let metrics = server.get("/metrics").await.text;
