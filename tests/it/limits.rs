@@ -5,6 +5,8 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 
 use crate::contract::{self, Received};
+use crate::durable::Folder;
+use crate::jobs::{ask, delete, result};
 use crate::routes::{ROUTES, route_of};
 use crate::support::{Server, fibonacci_sphere};
 
@@ -250,5 +252,66 @@ async fn a_full_queue_turns_requests_away_until_there_is_room() {
         for route in &ROUTES {
             server.post(route.path, &route.request()).await.expect_ok();
         }
+    }
+}
+
+/// Returns the path of a cloud, from its description.
+fn path_of(cloud: &Value) -> String {
+    format!("/v1/clouds/{}", cloud["cloud_id"].as_str().unwrap())
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_full_queue_leaves_what_needs_no_computation() {
+    let folder = Folder::new("queue-full");
+    for store in [&[][..], &folder.flags()] {
+        let flags = [store, &["--threads", "1", "--max-queue", "0", "--deadline-seconds", "600"]].concat();
+        let clouds = {
+            let server = Server::with_flags(&flags).await;
+            let cloud = |k: usize| json!({"points": fibonacci_sphere(20 + k)});
+            let mut clouds = Vec::new();
+            for k in 0..3 {
+                clouds.push(path_of(&server.post("/v1/clouds", &cloud(k)).await.json()));
+            }
+            let job = ask(server.url("/v1/normals"), &route_of("/v1/normals").request(), &[]).await;
+            result(&server, &job).await.expect_ok();
+            let slow = server.client.post(server.url("/v1/curvatures")).json(&slow_request());
+            let slow = tokio::spawn(slow.send());
+            while server.get("/health/ready").await.status == 200 {}
+            server
+                .post("/v1/normals", &route_of("/v1/normals").request())
+                .await
+                .expect_problem(503, "overloaded");
+            let list = server.get("/v1/clouds").await.expect_ok();
+            let listed: Vec<_> = list["clouds"].as_array().unwrap().iter().map(path_of).collect();
+            assert!(clouds.iter().all(|cloud| listed.contains(cloud)), "{list}");
+            let first = server.get(&clouds[0]).await.expect_ok();
+            assert_eq!((&first["n_points"], first["spacing"].is_object()), (&json!(20), true));
+            let heads = server.client.head(server.url(&clouds[1])).send().await.unwrap();
+            assert_eq!(heads.status(), 200);
+            let deleted = server.client.delete(server.url(&clouds[2])).send().await.unwrap();
+            assert_eq!(deleted.status(), 204);
+            assert_eq!(server.get(&job).await.expect_ok()["status"], "succeeded");
+            result(&server, &job).await.expect_ok();
+            assert_eq!(delete(&server, &job).await, 204);
+            slow.abort();
+            clouds
+        };
+        if store.is_empty() {
+            continue;
+        }
+        // A new process knows the clouds from the store alone. Their spacing has yet to be computed.
+        let server = Server::with_flags(&flags).await;
+        let slow = server.client.post(server.url("/v1/curvatures")).json(&slow_request());
+        let slow = tokio::spawn(slow.send());
+        while server.get("/health/ready").await.status == 200 {}
+        let list = server.get("/v1/clouds").await.expect_ok();
+        let listed: Vec<_> = list["clouds"].as_array().unwrap().iter().map(path_of).collect();
+        let is_listed: Vec<_> = clouds.iter().map(|cloud| listed.contains(cloud)).collect();
+        assert_eq!(is_listed, [true, true, false], "{list}");
+        assert_eq!(server.client.head(server.url(&clouds[0])).send().await.unwrap().status(), 200);
+        server.get(&clouds[0]).await.expect_problem(503, "overloaded");
+        slow.abort();
+        while server.get("/health/ready").await.status != 200 {}
+        assert!(server.get(&clouds[0]).await.expect_ok()["spacing"].is_object());
     }
 }

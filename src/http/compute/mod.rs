@@ -175,14 +175,28 @@ impl Compute {
     ///
     /// # Errors
     /// Returns the errors of [`Compute::run`].
+    pub async fn run_without_place<T: Send + 'static>(
+        &self,
+        owner: Owner,
+        flops: f64,
+        job: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, Problem> {
+        let lane = self.lane(flops, false);
+        let turn = lane.turn(owner).await;
+        let (result, _) = lane.run(turn, None, |_| job()).await.ok_or_else(panicked)?;
+        Ok(result)
+    }
+
+    /// Runs a small job without a place ([`Compute::run_without_place`]).
+    ///
+    /// # Errors
+    /// Returns the errors of [`Compute::run`].
     pub async fn run_small<T: Send + 'static>(
         &self,
         owner: Owner,
         job: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, Problem> {
-        let turn = self.light.turn(owner).await;
-        let (result, _) = self.light.run(turn, None, |_| job()).await.ok_or_else(panicked)?;
-        Ok(result)
+        self.run_without_place(owner, 0.0, job).await
     }
 
     fn lanes(&self) -> [(&'static str, &Lane); 4] {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
 use axum::Extension;
+use axum::body::{Body, HttpBody};
 use axum::extract::{Path, RawQuery, Request, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -25,6 +26,7 @@ use crate::http::wire::etag::is_known;
 use crate::http::wire::negotiation::BodyFormat;
 use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
+use crate::http::wire::write::encode::holding;
 use crate::http::wire::write::json::{Json, timestamp};
 use crate::store::Owner;
 use crate::store::clouds::{CloudPage, ListedCloud, RegisteredCloud};
@@ -172,7 +174,7 @@ pub async fn create_cloud(
         let (request, mut memory) = intake.parse::<CloudRequest>(&shared, observer)?;
         let planner = Planner::new(&shared, owner);
         let (stored, is_new) = planner.register(request.points, request.normals, "")?;
-        // `describe` samples the cloud, which takes memory beside the cloud itself.
+        // The cloud is sampled, which takes memory beside the cloud itself.
         memory.shrink_to(
             stored
                 .n_bytes()
@@ -184,7 +186,8 @@ pub async fn create_cloud(
     // The store decides if there is one. Memory drops clouds, and other processes delete them.
     let is_new_to_store = keep(&app, owner, &stored).await?;
     let is_new = if app.durable.is_some() { is_new_to_store } else { is_new };
-    let cloud = describe(&app, &admission, &stored).await?;
+    sample(&app, &admission, &stored).await?;
+    let cloud = Cloud::from(stored.as_ref());
     let location = format!("/v1/clouds/{}", cloud.cloud_id);
     let status = if is_new { StatusCode::CREATED } else { StatusCode::OK };
     let named = [(header::LOCATION, location), (CLOUD_HEADER, cloud.cloud_id.clone())];
@@ -213,28 +216,25 @@ pub async fn get_cloud(
     Path(cloud_id): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let admission = app.compute.admit(owner)?;
-    let stored = find(&app, &admission, &cloud_id).await?;
+    let stored = find(&app, owner, &cloud_id).await?;
     let etag = etag_of(&stored);
     if is_known(&headers, &etag) {
         return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, etag)]).into_response());
     }
-    let cloud = describe(&app, &admission, &stored).await?;
-    Ok(([(header::ETAG, etag)], Json(cloud)).into_response())
+    if stored.scales().is_none() {
+        sample(&app, &app.compute.admit(owner)?, &stored).await?;
+    }
+    Ok(([(header::ETAG, etag)], Json(Cloud::from(stored.as_ref()))).into_response())
 }
 
-/// Describes a cloud, including its spacing. Samples the cloud unless it was sampled before.
-async fn describe(
-    app: &Arc<App>,
-    admission: &Arc<Admission>,
-    stored: &RegisteredCloud,
-) -> Result<Cloud, Problem> {
+/// Samples a cloud, so that its description has the spacing. Costs nothing if it was sampled before.
+async fn sample(app: &Arc<App>, admission: &Arc<Admission>, stored: &RegisteredCloud) -> Result<(), Problem> {
     let (n, d) = (stored.cloud.n_points(), stored.cloud.dimension());
     let work = Work { operation: "describe_cloud", is_cached: false, flops: sampling_price(n, d).flops };
     admission.set_work(work);
     find_sampling(app, admission, stored).await?;
     admission.finish();
-    Ok(Cloud::from(stored))
+    Ok(())
 }
 
 /// Check for a cloud
@@ -253,8 +253,7 @@ pub async fn check_cloud(
     Path(cloud_id): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let admission = app.compute.admit(owner)?;
-    let etag = etag_of(find(&app, &admission, &cloud_id).await?.as_ref());
+    let etag = etag_of(find(&app, owner, &cloud_id).await?.as_ref());
     let status = if is_known(&headers, &etag) { StatusCode::NOT_MODIFIED } else { StatusCode::OK };
     let json = HeaderValue::from_static("application/json");
     let mut response = (status, [(header::ETAG, etag)]).into_response();
@@ -302,12 +301,21 @@ pub async fn list_clouds(
     State(app): State<Arc<App>>,
     Extension(owner): Extension<Owner>,
     RawQuery(query): RawQuery,
-) -> Result<Json<CloudList>, Problem> {
+) -> Result<Response, Problem> {
     let window = parse_window(query.as_deref().unwrap_or(""))?;
-    let admission = app.compute.admit(owner)?;
-    let CloudPage { clouds, next } = list_of(&app, &admission, window).await?;
+    let CloudPage { clouds, next } = list_of(&app, owner, window).await?;
     let next = next.map(|place| Cursor(place).to_string());
-    Ok(Json(CloudList { clouds: clouds.into_iter().map(Cloud::from).collect(), next }))
+    let list = CloudList { clouds: clouds.into_iter().map(Cloud::from).collect(), next };
+    held(&app, owner, Json(list).into_response())
+}
+
+/// Reserves the bytes of an answer until it is sent. A page may be long, and its client may read slowly.
+fn held(app: &App, owner: Owner, answer: Response) -> Result<Response, Problem> {
+    let n_bytes = usize::try_from(answer.body().size_hint().lower()).unwrap_or(usize::MAX);
+    let memory = app.prepared.try_reserve(owner, n_bytes).ok_or_else(|| app.compute.out_of_memory())?;
+    let mut answer = answer.map(|body| Body::from_stream(holding(body.into_data_stream(), memory)));
+    answer.headers_mut().insert(header::CONTENT_LENGTH, n_bytes.into());
+    Ok(answer)
 }
 
 /// The place of the last cloud of a page in the order of the list. Opaque to clients.
@@ -370,12 +378,8 @@ fn etag_of(stored: &RegisteredCloud) -> String {
     format!("W/\"{}\"", stored.id)
 }
 
-async fn find(
-    app: &Arc<App>,
-    admission: &Arc<Admission>,
-    cloud_id: &str,
-) -> Result<Arc<RegisteredCloud>, Problem> {
+async fn find(app: &Arc<App>, owner: Owner, cloud_id: &str) -> Result<Arc<RegisteredCloud>, Problem> {
     let unknown = || unknown_cloud(cloud_id);
     let id = CloudId::parse(cloud_id).ok_or_else(unknown)?;
-    find_cloud(app, admission, id).await?.ok_or_else(unknown)
+    find_cloud(app, owner, id).await?.ok_or_else(unknown)
 }

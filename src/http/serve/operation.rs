@@ -294,7 +294,7 @@ async fn prepare<O: Operation>(
             Parsed::Planned(planned) => break planned,
             Parsed::Unplanned(mut received, ids) => {
                 for id in ids {
-                    received.known.clouds.extend(find_cloud(app, admission, id).await?);
+                    received.known.clouds.extend(find_cloud(app, admission.owner, id).await?);
                 }
                 received
             }

@@ -10,7 +10,6 @@ use std::time::{Duration, SystemTime};
 use bytes::Bytes;
 use tracing::Instrument;
 
-use crate::http::compute::{Admission, JobObserver};
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::http::state::app::App;
@@ -67,10 +66,9 @@ async fn to_its_end<T: Send + 'static>(
 /// 503 if the store does not answer, or there is no memory for the cloud.
 pub async fn find_cloud(
     app: &Arc<App>,
-    admission: &Arc<Admission>,
+    owner: Owner,
     id: CloudId,
 ) -> Result<Option<Arc<RegisteredCloud>>, Problem> {
-    let owner = admission.owner;
     let Some(Durable { objects, .. }) = &app.durable else { return Ok(app.clouds.get(owner, id)) };
     match app.clouds.recall(objects, &holder_of(app, owner), id, TRUST).await {
         Recalled::LocalJob(cloud) => return Ok(Some(cloud)),
@@ -80,25 +78,26 @@ pub async fn find_cloud(
         }
         Recalled::Unknown => {}
     }
-    let read = || read_cloud(app.clone(), admission.clone(), id);
+    let read = || read_cloud(app.clone(), owner, id);
     app.clouds.get_or_read(owner, id, read).await
 }
 
 async fn read_cloud(
     app: Arc<App>,
-    admission: Arc<Admission>,
+    owner: Owner,
     id: CloudId,
 ) -> Result<Option<Arc<RegisteredCloud>>, Problem> {
     let Some(Durable { objects, .. }) = &app.durable else { return Ok(None) };
-    let holder = holder_of(&app, admission.owner);
+    let holder = holder_of(&app, owner);
     let refused = |error: Unavailable| unavailable(&error);
     let Some(n_bytes) = objects.cloud_bytes(&holder.name, id).await.map_err(refused)? else {
         return Ok(None);
     };
     let memory = reserve_for_reading(&app, holder.owner, id, n_bytes).await?;
     let Some(bytes) = objects.get_cloud(&holder.name, id).await.map_err(refused)? else { return Ok(None) };
-    let job = move |_: &JobObserver| (decode(id, &bytes), memory);
-    let (read, _memory) = app.compute.run(&admission, n_bytes as f64 * FLOPS_PER_BYTE, job).await?.0;
+    let job = move || (decode(id, &bytes), memory);
+    let flops = n_bytes as f64 * FLOPS_PER_BYTE;
+    let (read, _memory) = app.compute.run_without_place(owner, flops, job).await?;
     app.clouds.take_in(objects, &holder, id, read).await.map_err(refused)
 }
 
@@ -198,15 +197,10 @@ fn check_readable(app: &App, cloud: &RegisteredCloud) -> Result<(), Problem> {
 ///
 /// # Errors
 /// 503 if the store does not answer.
-pub async fn list_clouds(
-    app: &Arc<App>,
-    admission: &Arc<Admission>,
-    window: ListWindow,
-) -> Result<CloudPage, Problem> {
-    let (owner, shared) = (admission.owner, app.clone());
+pub async fn list_clouds(app: &Arc<App>, owner: Owner, window: ListWindow) -> Result<CloudPage, Problem> {
+    let shared = app.clone();
     // This computes nothing, but takes longer than an async worker may be held.
-    let job = move |_: &JobObserver| shared.clouds.unstored_places(owner);
-    let unstored = app.compute.run(admission, 0.0, job).await?.0;
+    let unstored = app.compute.run_small(owner, move || shared.clouds.unstored_places(owner)).await?;
     let objects = app.durable.as_ref().map(|durable| &*durable.objects);
     let page = app.clouds.page(objects, &holder_of(app, owner), window, unstored).await;
     page.map_err(|error| unavailable(&error))
