@@ -27,6 +27,8 @@ pub mod learned;
 pub mod objects;
 pub mod prepared;
 mod single_flight;
+#[cfg(test)]
+pub mod testing;
 
 pub use fair_cache::Counts;
 

@@ -8,23 +8,19 @@
 //! AT REST. Each process finds the cloud and lists it once exactly if its object is in the store. Nothing
 //! else is left in the store.
 
-mod choose;
-#[path = "../../../../numerics/tests/common/random.rs"]
-mod random;
 mod requests;
-mod stepped;
 
 use std::sync::Arc;
 
 use super::CloudStore;
 use crate::store::key::CloudId;
 use crate::store::objects::Objects;
-use choose::{Choose, Odometer};
+use crate::store::testing::choose::{Choose, Odometer};
+use crate::store::testing::random::Random;
+use crate::store::testing::stepped::{Gate, Stepped, Stops};
 use gramian_numerics::points::cloud::Cloud;
 use object_store::path::Path;
-use random::Random;
 use requests::{Answer, Process, Request};
-use stepped::{Gate, Stepped};
 use tokio::task::JoinHandle;
 
 /// A store, its processes, and the outcome of each request.
@@ -65,13 +61,9 @@ fn id() -> CloudId {
     CloudId::of(&cloud(), None)
 }
 
-/// Yields without progress before a run counts as settled: as many as the longest chain of tasks that wake
-/// each other within a process.
-const HOPS: usize = 8;
-
 impl World {
     fn new(setting: Setting) -> Self {
-        let (store, gate) = Stepped::new(setting.tells_absence);
+        let (store, gate) = Stepped::new(setting.tells_absence, Stops::default());
         let process = |_| {
             let objects = Arc::new(Objects::over(Arc::new(store.clone()), Path::default()));
             Process { clouds: Arc::new(CloudStore::new(setting.n_bytes)), objects }
@@ -98,13 +90,7 @@ impl World {
 
     /// Runs all tasks until every call of the store is parked.
     async fn settle(&mut self) {
-        let mut n_idle = 0;
-        let mut n_moves = self.gate.n_moves();
-        while n_idle < HOPS {
-            tokio::task::yield_now().await;
-            n_idle = if self.gate.n_moves() == n_moves { n_idle + 1 } else { 0 };
-            n_moves = self.gate.n_moves();
-        }
+        self.gate.settle().await;
         self.now += 1;
         let (done, under_way): (Vec<_>, Vec<_>) =
             std::mem::take(&mut self.under_way).into_iter().partition(|(_, task)| task.is_finished());

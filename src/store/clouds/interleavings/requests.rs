@@ -3,7 +3,6 @@
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
-use super::stepped::Stepped;
 use super::{cloud, id};
 use crate::store::Owner;
 use crate::store::clouds::{CloudStore, Holder, Kept, Recalled, RegisteredCloud};
@@ -11,8 +10,6 @@ use crate::store::key::CloudId;
 use crate::store::objects::cloud_object::{decode, encode};
 use crate::store::objects::{ListWindow, Objects, OwnerName, Retention, Unavailable};
 use bytes::Bytes;
-use futures_util::TryStreamExt;
-use object_store::ObjectStore;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Request {
@@ -124,13 +121,5 @@ impl Process {
             self.clouds.offer(&self.objects, &holder(), &cloud, || encoded(cloud.clone())).await;
         }
         Answer::Done
-    }
-}
-
-impl Stepped {
-    /// Names of all objects, found without a stop.
-    pub async fn names(&self) -> Vec<String> {
-        let found: Vec<_> = self.objects().list(None).try_collect().await.unwrap();
-        found.into_iter().map(|object| object.location.to_string()).collect()
     }
 }

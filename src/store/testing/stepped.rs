@@ -1,13 +1,13 @@
-//! A store in memory whose calls stop twice: before they take effect and before they are answered. A schedule
-//! lets them go on.
+//! A store in memory whose calls stop before they take effect, and before they are answered. A schedule lets
+//! them go on.
 
 use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use async_trait::async_trait;
-use futures_util::StreamExt;
 use futures_util::stream::{self, BoxStream};
+use futures_util::{StreamExt, TryStreamExt};
 use object_store::memory::InMemory;
 use object_store::path::Path;
 use object_store::{
@@ -16,9 +16,39 @@ use object_store::{
 };
 use tokio::sync::oneshot;
 
+/// Yields without progress before a run counts as settled: as many as the longest chain of tasks that wake
+/// each other within a process.
+const HOPS: usize = 8;
+
+/// Kind of a call of the store.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Call {
+    Put,
+    Get,
+    Delete,
+    List,
+}
+
+/// Places in which calls stop.
+#[derive(Debug, Clone, Copy)]
+pub struct Stops {
+    /// Whether calls of a kind stop at a name or folder. The others pass, in one step with the call before.
+    pub at: fn(Call, &Path) -> bool,
+    /// Whether calls also stop before they are answered. Where processes share nothing but the store, that
+    /// adds no new order of effects.
+    pub before_answers: bool,
+}
+
+impl Default for Stops {
+    fn default() -> Self {
+        Self { at: |_, _| true, before_answers: true }
+    }
+}
+
 /// The parked calls, and the behaviour of the store.
 #[derive(Debug, Default)]
 pub struct Gate {
+    stops: Stops,
     parked: Mutex<Vec<oneshot::Sender<()>>>,
     /// Number of times that a call stopped or went on.
     n_moves: AtomicUsize,
@@ -41,7 +71,7 @@ impl Gate {
         self.parked().len()
     }
 
-    pub fn n_moves(&self) -> usize {
+    fn n_moves(&self) -> usize {
         self.n_moves.load(Ordering::Relaxed)
     }
 
@@ -69,7 +99,17 @@ impl Gate {
         self.parked.lock().unwrap()
     }
 
-    async fn pass(&self) {
+    /// Runs all tasks until every call of the store is parked.
+    pub async fn settle(&self) {
+        let (mut n_idle, mut n_moves) = (0, self.n_moves());
+        while n_idle < HOPS {
+            tokio::task::yield_now().await;
+            n_idle = if self.n_moves() == n_moves { n_idle + 1 } else { 0 };
+            n_moves = self.n_moves();
+        }
+    }
+
+    async fn stop(&self) {
         if self.is_open.load(Ordering::Relaxed) {
             return;
         }
@@ -79,32 +119,48 @@ impl Gate {
         released.await.ok();
     }
 
-    async fn change<T>(&self, effect: impl Future<Output = Result<T>>) -> Result<T> {
-        self.pass().await;
-        if self.is_broken() {
-            return Err(Error::Generic { store: "stepped", source: "it takes nothing".into() });
-        }
-        let answer = effect.await;
-        self.pass().await;
-        answer
+    async fn change<T>(&self, call: Call, name: &Path, effect: impl Future<Output = Result<T>>) -> Result<T> {
+        let effect = async {
+            if self.is_broken() {
+                return Err(Error::Generic { store: "stepped", source: "it takes nothing".into() });
+            }
+            effect.await
+        };
+        self.step(call, name, effect).await
     }
 
-    async fn look<T>(&self, effect: impl Future<Output = T>) -> T {
-        self.pass().await;
+    async fn step<T>(&self, call: Call, name: &Path, effect: impl Future<Output = T>) -> T {
+        let stops = (self.stops.at)(call, name);
+        if stops {
+            self.stop().await;
+        }
         let answer = effect.await;
-        self.pass().await;
+        // A call that passes is progress as well.
+        self.n_moves.fetch_add(1, Ordering::Relaxed);
+        if stops && self.stops.before_answers {
+            self.stop().await;
+        }
         answer
     }
 }
 
 impl Stepped {
-    pub fn new(tells_absence: bool) -> (Self, Arc<Gate>) {
-        let gate = Arc::new(Gate { tells_absence: tells_absence.into(), ..Gate::default() });
+    pub fn new(tells_absence: bool, stops: Stops) -> (Self, Arc<Gate>) {
+        let gate = Arc::new(Gate { stops, tells_absence: tells_absence.into(), ..Gate::default() });
         (Self { inner: Arc::default(), gate: gate.clone() }, gate)
     }
 
-    pub fn objects(&self) -> &InMemory {
-        &self.inner
+    /// Names of all objects, found without a stop.
+    pub async fn names(&self) -> Vec<String> {
+        let found: Vec<_> = self.inner.list(None).try_collect().await.unwrap();
+        found.into_iter().map(|object| object.location.to_string()).collect()
+    }
+
+    /// Deletes all objects, without a stop.
+    pub async fn clear(&self) {
+        for name in self.names().await {
+            self.inner.delete(&name.into()).await.unwrap();
+        }
     }
 
     async fn delete_one(self, name: Path) -> Result<Path> {
@@ -117,7 +173,7 @@ impl Stepped {
                 Err(Error::NotFound { path: name.to_string(), source: "absent".into() })
             }
         };
-        self.gate.change(effect).await
+        self.gate.change(Call::Delete, &name, effect).await
     }
 }
 
@@ -130,7 +186,7 @@ impl fmt::Display for Stepped {
 #[async_trait]
 impl ObjectStore for Stepped {
     async fn put_opts(&self, name: &Path, payload: PutPayload, options: PutOptions) -> Result<PutResult> {
-        self.gate.change(self.inner.put_opts(name, payload, options)).await
+        self.gate.change(Call::Put, name, self.inner.put_opts(name, payload, options)).await
     }
 
     async fn put_multipart_opts(
@@ -142,7 +198,7 @@ impl ObjectStore for Stepped {
     }
 
     async fn get_opts(&self, name: &Path, options: GetOptions) -> Result<GetResult> {
-        self.gate.look(self.inner.get_opts(name, options)).await
+        self.gate.step(Call::Get, name, self.inner.get_opts(name, options)).await
     }
 
     fn delete_stream(&self, names: BoxStream<'static, Result<Path>>) -> BoxStream<'static, Result<Path>> {
@@ -154,16 +210,17 @@ impl ObjectStore for Stepped {
         let (store, folder) = (self.clone(), folder.cloned());
         let listing = async move {
             let found = async { store.inner.list(folder.as_ref()).collect::<Vec<_>>().await };
-            stream::iter(store.gate.look(found).await)
+            stream::iter(store.gate.step(Call::List, &folder.clone().unwrap_or_default(), found).await)
         };
         stream::once(listing).flatten().boxed()
     }
 
     async fn list_with_delimiter(&self, folder: Option<&Path>) -> Result<ListResult> {
-        self.gate.look(self.inner.list_with_delimiter(folder)).await
+        let name = folder.cloned().unwrap_or_default();
+        self.gate.step(Call::List, &name, self.inner.list_with_delimiter(folder)).await
     }
 
     async fn copy_opts(&self, from: &Path, to: &Path, options: CopyOptions) -> Result<()> {
-        self.gate.change(self.inner.copy_opts(from, to, options)).await
+        self.gate.change(Call::Put, to, self.inner.copy_opts(from, to, options)).await
     }
 }
