@@ -14,13 +14,13 @@ use super::{Runner, kept_headers};
 use crate::http::around::middleware::CLOUD_HEADER;
 use crate::http::around::trace::TraceParent;
 use crate::http::problem::Problem;
-use crate::http::serve::durable::unavailable;
+use crate::http::serve::durable::{to_its_end, unavailable};
 use crate::http::serve::intake::read_bytes;
 use crate::http::state::jobs::LocalJob;
 use crate::http::state::kept::SECONDS_UNTIL_COUNTED;
 use crate::http::wire::write::json::Json;
 use crate::store::Owner;
-use crate::store::objects::jobs::{Claim, ClaimName, JobId, JobRequest, NewJob};
+use crate::store::objects::jobs::{Claim, JobId, JobRequest, KeyHash, NewJob, Register};
 
 const PREFER: HeaderName = HeaderName::from_static("prefer");
 const PREFERENCE_APPLIED: HeaderName = HeaderName::from_static("preference-applied");
@@ -64,12 +64,12 @@ fn prefers_async(headers: &HeaderMap) -> bool {
     })
 }
 
-async fn accept(runner: Runner, request: Request) -> Result<Response, Problem> {
+pub(super) async fn accept(runner: Runner, request: Request) -> Result<Response, Problem> {
     let app = runner.app.clone();
     let (parts, body) = request.into_parts();
     let owner = parts.extensions.get::<Owner>().copied().ok_or_else(Problem::internal)?;
     let key = key_of(&parts.headers)?;
-    let (bytes, _memory) = read_bytes(&app, owner, &parts.headers, body).await?;
+    let (bytes, memory) = read_bytes(&app, owner, &parts.headers, body).await?;
     let path = parts.uri.path().to_owned();
     let kept = kept_headers(&parts.headers, &KEPT_HEADERS);
     let trace = parts.extensions.get::<TraceParent>().map(|parent| (TRACE.to_owned(), parent.to_string()));
@@ -79,32 +79,16 @@ async fn accept(runner: Runner, request: Request) -> Result<Response, Problem> {
         let entered = asked.write(&runner).await?;
         return Ok(accepted(&entered.begin()?));
     };
-    let fingerprint = fingerprint(&asked.request, &MEANT_HEADERS, &asked.body).await;
-    // One of several equal requests claims the key. The others find its job in the next turn, unless it was
-    // deleted meanwhile.
-    for _ in 0..ATTEMPTS {
-        let claim = match known(&app, owner, &key, &fingerprint).await? {
-            Known::Job(view) => return Ok(accepted(&view)),
-            Known::Free(claim) => claim,
-        };
-        let entered = asked.write(&runner).await?;
-        match entered.claim(&claim, &fingerprint).await {
-            Ok(true) => return Ok(accepted(&entered.begin()?)),
-            Ok(false) => entered.withdraw().await?,
-            Err(problem) => {
-                entered.withdraw().await.ok();
-                return Err(problem);
-            }
-        }
-    }
-    Err(Problem::unavailable(
-        "jobs with this Idempotency-Key are created and deleted too quickly",
-        SECONDS_UNTIL_COUNTED,
-    ))
+    // A client that leaves between the writes of a job and of its claim would leave a job that nobody knows.
+    let accepting = async move {
+        let _memory = memory;
+        asked.with_key(&runner, &key).await
+    };
+    to_its_end(accepting).await.map(|view| accepted(&view))
 }
 
 /// Attempts to find or claim the job of a key.
-const ATTEMPTS: usize = 4;
+const ATTEMPTS: usize = 8;
 
 /// 202 with the location of the job.
 fn accepted(view: &JobView) -> Response {
@@ -122,6 +106,45 @@ struct Asked {
 }
 
 impl Asked {
+    /// Returns the job of a key: the one that claims it already, or a new one.
+    async fn with_key(&self, runner: &Runner, key: &KeyHash) -> Result<JobView, Problem> {
+        let mut written = None;
+        match (self.claim(runner, key, &mut written).await, written) {
+            (Ok(None), Some(entered)) => entered.begin(),
+            (outcome, written) => {
+                if let Some(entered) = written {
+                    entered.withdraw().await;
+                }
+                outcome?.ok_or_else(Problem::internal)
+            }
+        }
+    }
+
+    /// Finds the job of a key, or writes a job and claims the key for it. Returns `None` if the job that was
+    /// written has the claim.
+    async fn claim<'a>(
+        &self,
+        runner: &'a Runner,
+        key: &KeyHash,
+        written: &mut Option<Entered<'a>>,
+    ) -> Result<Option<JobView>, Problem> {
+        let fingerprint = fingerprint(&self.request, &MEANT_HEADERS, &self.body).await;
+        for _ in 0..ATTEMPTS {
+            let register = match known(&runner.app, self.owner, key, &fingerprint).await? {
+                Known::Job(view) => return Ok(Some(*view)),
+                Known::Free(register) => register,
+            };
+            let entered = match written.take() {
+                Some(entered) => entered,
+                None => self.write(runner).await?,
+            };
+            if written.insert(entered).claim(register, key, &fingerprint).await? {
+                return Ok(None);
+            }
+        }
+        Err(Problem::unavailable("jobs with Idempotency-Keys are created too quickly", SECONDS_UNTIL_COUNTED))
+    }
+
     /// Writes the job. It waits until [`Entered::begin`].
     async fn write<'a>(&self, runner: &'a Runner) -> Result<Entered<'a>, Problem> {
         let (app, owner, id) = (&runner.app, self.owner, JobId::new());
@@ -149,12 +172,12 @@ struct Entered<'a> {
 }
 
 impl Entered<'_> {
-    /// Claims a key for the job. Returns false if another job has it.
-    async fn claim(&self, claim: &ClaimName, fingerprint: &str) -> Result<bool, Problem> {
+    /// Claims a key for the job. Returns false if the register was changed meanwhile.
+    async fn claim(&self, register: Register, key: &KeyHash, fingerprint: &str) -> Result<bool, Problem> {
         let Some(here) = &self.here else { return Err(Problem::internal()) };
         let app = &self.runner.app;
-        let meant = Claim::new(here.id, fingerprint.to_owned());
-        let claimed = app.jobs.objects.claim_key(&app.keys.name_of(here.owner), claim, &meant).await;
+        let claim = Claim::new(key.clone(), here.id, fingerprint.to_owned());
+        let claimed = app.jobs.objects.claim_key(&app.keys.name_of(here.owner), register, claim).await;
         claimed.map_err(|error| unavailable(&error))
     }
 
@@ -166,12 +189,13 @@ impl Entered<'_> {
         Ok(view)
     }
 
-    /// Deletes the job.
-    async fn withdraw(self) -> Result<(), Problem> {
-        let Some(here) = &self.here else { return Ok(()) };
+    /// Deletes the job. One that the store keeps all the same is begun by a later round, without a claim.
+    async fn withdraw(self) {
+        let Some(here) = &self.here else { return };
         let app = &self.runner.app;
-        let forgotten = app.jobs.forget(&app.keys.name_of(here.owner), here.id).await;
-        forgotten.map(|_| ()).map_err(|error| unavailable(&error))
+        if let Err(error) = app.jobs.forget(&app.keys.name_of(here.owner), here.id).await {
+            tracing::warn!(job = %here.id, %error, "a job without a claim could not be deleted");
+        }
     }
 }
 

@@ -8,7 +8,7 @@ use crate::http::problem::slug::Slug;
 use crate::http::serve::durable::unavailable;
 use crate::http::state::app::App;
 use crate::store::Owner;
-use crate::store::objects::jobs::{ClaimName, JobRequest, KeyHash};
+use crate::store::objects::jobs::{JobRequest, KeyHash, Register};
 
 pub const IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
 
@@ -22,8 +22,8 @@ const PIECE: usize = 1 << 20;
 pub(super) enum Known {
     /// The key belongs to this job.
     Job(Box<JobView>),
-    /// The key has no job. The next job claims it by this name.
-    Free(ClaimName),
+    /// The key has no job. The next job claims it in this register, as it was read.
+    Free(Register),
 }
 
 /// The hash of the key in the head of a request, if there is one.
@@ -76,13 +76,12 @@ pub(super) async fn known(
     key: &KeyHash,
     fingerprint: &str,
 ) -> Result<Known, Problem> {
-    let found = app.jobs.objects.find_claim(&app.keys.name_of(owner), key).await;
-    let (generation, claim) = match found.map_err(|error| unavailable(&error))? {
-        Some((generation, claim)) => (generation.saturating_add(1), claim),
-        None => (0, None),
+    let register = app.jobs.objects.register(&app.keys.name_of(owner), key).await;
+    let register = register.map_err(|error| unavailable(&error))?;
+    let claim = register.claim(key);
+    let Some((id, claim)) = claim.and_then(|claim| Some((claim.job()?, claim))) else {
+        return Ok(Known::Free(register));
     };
-    let free = Known::Free(ClaimName { key: key.clone(), generation });
-    let Some((id, claim)) = claim.and_then(|claim| Some((claim.job()?, claim))) else { return Ok(free) };
     match look(app, owner, id).await {
         Ok(_) if claim.fingerprint != fingerprint => {
             let detail =
@@ -90,7 +89,7 @@ pub(super) async fn known(
             Err(Problem::new(Slug::InvalidRequest, detail))
         }
         Ok(view) => Ok(Known::Job(Box::new(view))),
-        Err(problem) if problem.slug() == Slug::UnknownJob => Ok(free),
+        Err(problem) if problem.slug() == Slug::UnknownJob => Ok(Known::Free(register)),
         Err(problem) => Err(problem),
     }
 }

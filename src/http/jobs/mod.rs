@@ -23,6 +23,8 @@
 mod accept;
 mod answer;
 mod idempotency;
+#[cfg(test)]
+mod interleavings;
 mod look;
 mod rounds;
 mod run;

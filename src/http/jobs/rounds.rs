@@ -122,7 +122,7 @@ impl Runner {
         for id in known.into_iter().filter(|id| !found_ids.contains(id) && jobs.find(*id).is_none()) {
             jobs.kept.remove(id);
         }
-        jobs.objects.sweep_claims(name, &found, now).await
+        jobs.objects.sweep_claims(name).await
     }
 
     /// Puts a job that was found in the store into the table of kept jobs.

@@ -53,14 +53,16 @@ fn holder_of(app: &App, owner: Owner) -> Holder {
     Holder { owner, name: app.keys.name_of(owner) }
 }
 
-/// Runs a change of a cloud to its end, even if the client leaves meanwhile. Nobody asked for half a change.
-async fn to_its_end<T: Send + 'static>(
+/// Runs a change of the store to its end, even if the client leaves meanwhile. Nobody asked for half a
+/// change.
+pub async fn to_its_end<T: Send + 'static>(
     change: impl Future<Output = Result<T, Problem>> + Send + 'static,
 ) -> Result<T, Problem> {
     tokio::spawn(change.in_current_span()).await.unwrap_or_else(|_| Err(Problem::internal()))
 }
 
-/// Returns a cloud of the admitted owner, from memory or from the store.
+/// Returns a cloud of an owner, from memory or from the store. A read takes no place among computations: the
+/// memory for it is reserved.
 ///
 /// # Errors
 /// 503 if the store does not answer, or there is no memory for the cloud.
@@ -193,7 +195,7 @@ fn check_readable(app: &App, cloud: &RegisteredCloud) -> Result<(), Problem> {
     Err(Problem::too_large(Slug::ProblemTooLarge, what, most, n_bytes).with_remedy(remedy))
 }
 
-/// Returns the first clouds within a window of the admitted owner's list.
+/// Returns the first clouds within a window of an owner's list.
 ///
 /// # Errors
 /// 503 if the store does not answer.

@@ -1,65 +1,65 @@
 //! Claims of jobs to the `Idempotency-Key` of their requests.
 //!
-//! A claim is the object `<owner>/claims/<hash of the key>/<generation>`, which names a job. Creating it is
-//! exclusive, so one of several equal requests claims the key. A job is written before it claims its key. So
-//! a claim to an unknown job is left over from a deleted one, and the next generation replaces it. The object
-//! `key-<hash of the key>-<generation>` of a job names its claim, which is removed with the job.
+//! REGISTERS. The claims of an owner are spread over 4,096 registers by the hash of the key. A register is a
+//! folder, `<owner>/claims/<three digits of the hash>`. Its last generation, an object named by a number, has
+//! all its claims. A change writes the next generation, and creating it is exclusive. So a request that
+//! creates it has seen every claim to its key: none was made since it looked.
+//!
+//! THE LAST GENERATION is never deleted, so a number never returns. Otherwise a request that looked before a
+//! deletion, and one that looked after it, would create different generations, and both have a claim.
+//!
+//! DELETIONS of jobs leave claims alone. A job is written before it claims its key, so a claim to an unknown
+//! job is left over from a deleted one, and may be replaced.
 
-use std::collections::HashSet;
+use std::collections::HashMap;
 use std::time::SystemTime;
 
-use bytes::Bytes;
+use object_store::ObjectStoreExt;
 use object_store::path::Path;
-use object_store::{ObjectStoreExt, PutPayload};
 use serde::{Deserialize, Serialize};
 
 use super::super::pieces::{sealed, unsealed};
 use super::super::retention::AT_WORK;
-use super::super::{Objects, OwnerName, Unavailable, Verb};
-use super::{JobId, JobObjects, line_of};
+use super::super::{Damaged, Objects, OwnerName, Unavailable, Verb};
+use super::{JobId, line_of};
 
 const FOLDER: &str = "claims";
-const KEY: &str = "key-";
+
+/// Digits of the hash of a key that name its register.
+const DIGITS: usize = 3;
+
+/// Claims of a register from which on those of deleted jobs are left out. Each takes a look for its job.
+const MANY: usize = 8;
+
+/// Looks at a register whose generations are replaced while they are read.
+const LOOKS: usize = 16;
 
 /// Hash of an idempotency key, used as part of object names.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
 pub struct KeyHash(String);
 
 impl KeyHash {
     pub fn of(key: &[u8]) -> Self {
         Self(blake3::hash(key).to_hex().to_string())
     }
-}
 
-/// Name of a claim.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub struct ClaimName {
-    pub key: KeyHash,
-    pub generation: u32,
-}
-
-impl ClaimName {
-    /// Parses the name of a claim from the name of an object of its job.
-    pub(super) fn parse(part: &str) -> Option<Self> {
-        let (key, generation) = part.strip_prefix(KEY)?.split_once('-')?;
-        Some(Self { key: KeyHash(key.to_owned()), generation: generation.parse().ok()? })
-    }
-
-    fn part(&self) -> String {
-        format!("{KEY}{}-{}", self.key.0, self.generation)
+    fn register(&self) -> &str {
+        &self.0[..DIGITS]
     }
 }
 
 /// The job that claims a key, and the fingerprint of the request that began it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Claim {
+    key: KeyHash,
     job: String,
     pub fingerprint: String,
 }
 
 impl Claim {
-    pub fn new(job: JobId, fingerprint: String) -> Self {
-        Self { job: job.to_string(), fingerprint }
+    pub fn new(key: KeyHash, job: JobId, fingerprint: String) -> Self {
+        Self { key, job: job.to_string(), fingerprint }
     }
 
     /// Returns the id of the job, if it is well-formed.
@@ -68,82 +68,123 @@ impl Claim {
     }
 }
 
+/// The claims of a register at one moment.
+#[derive(Debug, Clone, Default)]
+pub struct Register {
+    /// Number of the generation. `None` before the first claim.
+    last: Option<u64>,
+    claims: Vec<Claim>,
+}
+
+impl Register {
+    /// Returns the claim to a key, if there is one.
+    pub fn claim(&self, key: &KeyHash) -> Option<&Claim> {
+        self.claims.iter().find(|claim| claim.key == *key)
+    }
+}
+
 impl Objects {
-    /// Finds the last claim to a key, with its generation. The claim is `None` if it cannot be read.
+    /// Reads the register of a key. A damaged one is reported, and has no claims.
     ///
     /// # Errors
     /// [`Unavailable`].
-    pub async fn find_claim(
-        &self,
-        owner: &OwnerName,
-        key: &KeyHash,
-    ) -> Result<Option<(u32, Option<Claim>)>, Unavailable> {
-        let found = self.objects_in(owner, &[FOLDER, &key.0]).await?;
-        let generations = found.iter().filter_map(|object| object.location.filename()?.parse().ok());
-        let Some(generation) = generations.max() else { return Ok(None) };
-        let claim = self.get_claim(owner, &ClaimName { key: key.clone(), generation }).await?;
-        Ok(Some((generation, claim)))
+    pub async fn register(&self, owner: &OwnerName, key: &KeyHash) -> Result<Register, Unavailable> {
+        let folder = self.path(&[&owner.0, FOLDER, key.register()]);
+        for _ in 0..LOOKS {
+            let found = self.objects_in(owner, &[FOLDER, key.register()]).await?;
+            let generations = found.iter().filter_map(|object| Some(place_of(&object.location)?.1));
+            let Some(last) = generations.max() else { return Ok(Register::default()) };
+            let name = self.generation(owner, key, last);
+            let found = async { self.store.get(&name).await?.bytes().await };
+            // A generation that is gone was replaced meanwhile.
+            if let Some(bytes) = self.counted(Verb::Read, &name, found.await)? {
+                let read = unsealed(&bytes).and_then(|line| {
+                    serde_json::from_slice(line).map_err(|_| Damaged("its line is no list of claims"))
+                });
+                let claims = read.unwrap_or_else(|damaged| {
+                    self.report(&name, damaged);
+                    Vec::new()
+                });
+                return Ok(Register { last: Some(last), claims });
+            }
+        }
+        let reason = "it is replaced too quickly".to_owned();
+        Err(Unavailable { verb: Verb::Read, name: folder.to_string(), reason })
     }
 
-    /// Claims a key for a job that was written. Returns false if another job has this claim.
+    /// Claims a key for a job that was written, given the register as it was read. Returns false if the
+    /// register was changed meanwhile.
     ///
     /// # Errors
     /// [`Unavailable`].
     pub async fn claim_key(
         &self,
         owner: &OwnerName,
-        name: &ClaimName,
-        claim: &Claim,
+        register: Register,
+        claim: Claim,
     ) -> Result<bool, Unavailable> {
-        let Some(id) = claim.job() else { return Ok(false) };
-        self.put(&self.job(owner, id, &name.part()), PutPayload::default()).await?;
-        self.create(&self.claim(owner, name), sealed(line_of(claim))).await
+        let Register { last, claims } = register;
+        let (is_long, key) = (claims.len() >= MANY, claim.key.clone());
+        let mut kept = Vec::new();
+        for other in claims.into_iter().filter(|other| other.key != key) {
+            if !is_long || self.knows_job_of(owner, &other).await? {
+                kept.push(other);
+            }
+        }
+        kept.push(claim);
+        let next = self.generation(owner, &key, last.map_or(0, |last| last + 1));
+        let is_claimed = self.create(&next, sealed(line_of(&kept))).await?;
+        if let Some(last) = last.filter(|_| is_claimed) {
+            // A generation that stays is removed by a sweep.
+            let _ = self.delete(&self.generation(owner, &key, last)).await;
+        }
+        Ok(is_claimed)
     }
 
-    /// Removes a claim if it belongs to this job.
-    pub(super) async fn drop_claim(
-        &self,
-        owner: &OwnerName,
-        name: &ClaimName,
-        id: JobId,
-    ) -> Result<(), Unavailable> {
-        let claim = self.get_claim(owner, name).await?;
-        if claim.is_some_and(|claim| claim.job() == Some(id)) {
-            self.delete(&self.claim(owner, name)).await?;
+    async fn knows_job_of(&self, owner: &OwnerName, claim: &Claim) -> Result<bool, Unavailable> {
+        let Some(id) = claim.job() else { return Ok(false) };
+        Ok(self.find_job(owner, id).await?.is_some_and(|job| job.is_known()))
+    }
+
+    /// Removes generations that were replaced, and what is no generation.
+    ///
+    /// # Errors
+    /// [`Unavailable`].
+    pub async fn sweep_claims(&self, owner: &OwnerName) -> Result<(), Unavailable> {
+        let found = self.objects_in(owner, &[FOLDER]).await?;
+        let mut last = HashMap::new();
+        for (register, generation) in found.iter().filter_map(|object| place_of(&object.location)) {
+            let most = last.entry(register).or_insert(generation);
+            *most = generation.max(*most);
+        }
+        let is_last = |name: &Path| {
+            place_of(name).is_some_and(|(register, generation)| last.get(&register) == Some(&generation))
+        };
+        for object in found.iter().filter(|object| !is_last(&object.location)) {
+            self.delete(&object.location).await?;
         }
         Ok(())
     }
 
-    /// Removes claims that belong to none of `jobs`, which are all jobs of the owner. Interrupted deletions
-    /// leave such claims behind.
-    ///
-    /// # Errors
-    /// [`Unavailable`].
-    pub async fn sweep_claims(
-        &self,
-        owner: &OwnerName,
-        jobs: &[JobObjects],
-        now: SystemTime,
-    ) -> Result<(), Unavailable> {
-        let claimed = jobs.iter().filter_map(|job| Some(self.claim(owner, job.claim.as_ref()?)));
-        let claimed: HashSet<Path> = claimed.collect();
+    /// Removes the claims of an owner who has no jobs and makes none.
+    pub(super) async fn forget_claims(&self, owner: &OwnerName, now: SystemTime) -> Result<(), Unavailable> {
         for object in self.objects_in(owner, &[FOLDER]).await? {
-            let age = now.duration_since(object.last_modified.into()).unwrap_or_default();
-            if age > AT_WORK && !claimed.contains(&object.location) {
+            if now.duration_since(object.last_modified.into()).is_ok_and(|age| age > AT_WORK) {
                 self.delete(&object.location).await?;
             }
         }
         Ok(())
     }
 
-    async fn get_claim(&self, owner: &OwnerName, name: &ClaimName) -> Result<Option<Claim>, Unavailable> {
-        let name = self.claim(owner, name);
-        let found = async { self.store.get(&name).await?.bytes().await };
-        let found: Option<Bytes> = self.counted(Verb::Read, &name, found.await)?;
-        Ok(found.and_then(|bytes| serde_json::from_slice(unsealed(&bytes).ok()?).ok()))
+    fn generation(&self, owner: &OwnerName, key: &KeyHash, number: u64) -> Path {
+        self.path(&[&owner.0, FOLDER, key.register(), &number.to_string()])
     }
+}
 
-    pub(super) fn claim(&self, owner: &OwnerName, ClaimName { key, generation }: &ClaimName) -> Path {
-        self.path(&[&owner.0, FOLDER, &key.0, &generation.to_string()])
-    }
+/// The register of a generation and its number, by its name.
+fn place_of(name: &Path) -> Option<(String, u64)> {
+    let name: &str = name.as_ref();
+    let (folder, number) = name.rsplit_once('/')?;
+    let register = folder.rsplit('/').next().filter(|register| register.len() == DIGITS)?;
+    Some((register.to_owned(), number.parse().ok()?))
 }

@@ -38,7 +38,7 @@ use uuid::Uuid;
 
 use super::{Objects, OwnerName, Unavailable};
 pub use asked::{FoundRequest, JobRequest, NewJob};
-pub use claims::{Claim, ClaimName, KeyHash};
+pub use claims::{Claim, KeyHash, Register};
 pub use leases::Lease;
 pub use results::{Answer, FoundResult, JobResult, Outcome};
 
@@ -96,8 +96,6 @@ pub struct JobObjects {
     pub ended_at: Option<SystemTime>,
     /// The last attempt, and the time at which its lease was written.
     pub lease: Option<(u32, SystemTime)>,
-    /// The claim to the `Idempotency-Key` of its request.
-    claim: Option<ClaimName>,
     pub n_bytes: u64,
 }
 
@@ -185,15 +183,12 @@ impl Objects {
         }
         self.unmark_open(owner, id).await?;
         let Some(job) = collected(found).pop() else { return Ok(false) };
-        if let Some(claim) = &job.claim {
-            self.drop_claim(owner, claim, id).await?;
-        }
         self.delete(&deleted).await?;
         Ok(job.has_request)
     }
 
-    /// Deletes jobs of owners that `knows` rejects, because their API key was removed. A job is deleted
-    /// `kept` after its end, or after `longest` without work on it.
+    /// Deletes jobs of owners that `knows` rejects, because their API key was removed, and then their claims.
+    /// A job is deleted `kept` after its end, or after `longest` without work on it.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -205,7 +200,11 @@ impl Objects {
         now: SystemTime,
     ) -> Result<(), Unavailable> {
         for owner in self.owners().await?.into_iter().filter(|owner| !knows(owner)) {
-            for job in self.jobs(&owner).await? {
+            let jobs = self.jobs(&owner).await?;
+            if jobs.is_empty() {
+                self.forget_claims(&owner, now).await?;
+            }
+            for job in jobs {
                 let written_at = job.lease.map_or(job.id.created_at(), |(_, written_at)| written_at);
                 let (since, most) = job.ended_at.map_or((written_at, longest), |ended_at| (ended_at, kept));
                 if now.duration_since(since).is_ok_and(|age| age > most) {
@@ -253,7 +252,6 @@ fn collected(found: Vec<ObjectMeta>) -> Vec<JobObjects> {
             is_deleted: false,
             ended_at: None,
             lease: None,
-            claim: None,
             n_bytes: 0,
         });
         job.n_bytes += object.size;
@@ -263,7 +261,6 @@ fn collected(found: Vec<ObjectMeta>) -> Vec<JobObjects> {
             RESULT => job.ended_at = Some(written_at),
             DELETED => job.is_deleted = true,
             other => {
-                job.claim = job.claim.take().or_else(|| ClaimName::parse(other));
                 if let Some(attempt) = other.strip_prefix(LEASE).and_then(|text| text.parse().ok()) {
                     job.lease = job.lease.max(Some((attempt, written_at)));
                 }

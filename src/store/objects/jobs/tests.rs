@@ -234,32 +234,76 @@ async fn of_all_who_delete_a_job_at_once_one_does() {
 }
 
 #[tokio::test]
-async fn a_key_is_that_of_one_job_and_goes_with_it() {
+async fn a_key_is_claimed_once_for_each_state_of_its_register() {
     let objects = Objects::in_memory();
     let (key, name) = (KeyHash::of(b"key"), owner());
-    let claim_of = |id| Claim::new(id, "print".to_owned());
-    let generation = |generation| ClaimName { key: key.clone(), generation };
+    let claim_of = |id| Claim::new(key.clone(), id, "print".to_owned());
     let (first, late) = (asked(&objects, b"").await, asked(&objects, b"").await);
-    assert_eq!(objects.find_claim(&name, &key).await.unwrap(), None);
-    assert!(objects.claim_key(&name, &generation(0), &claim_of(first)).await.unwrap());
-    assert!(!objects.claim_key(&name, &generation(0), &claim_of(late)).await.unwrap());
-    // Deleting the late job does not remove the claim of the first one.
-    assert!(objects.delete_job(&name, late).await.unwrap());
-    assert_eq!(objects.find_claim(&name, &key).await.unwrap(), Some((0, Some(claim_of(first)))));
+    let empty = objects.register(&name, &key).await.unwrap();
+    assert_eq!(empty.claim(&key), None);
+    assert!(objects.claim_key(&name, empty.clone(), claim_of(first)).await.unwrap());
+    assert!(!objects.claim_key(&name, empty.clone(), claim_of(late)).await.unwrap());
+    let after_first = objects.register(&name, &key).await.unwrap();
+    assert_eq!(after_first.claim(&key), Some(&claim_of(first)));
+    // A deletion leaves the claim. Whoever looked before another claim was made makes none.
     assert!(objects.delete_job(&name, first).await.unwrap());
-    assert_eq!(objects.find_claim(&name, &key).await.unwrap(), None);
-    // The claim of a deleted job is followed by another. A claim that no job has is removed after an hour.
-    let id = asked(&objects, b"").await;
-    assert!(objects.claim_key(&name, &generation(7), &claim_of(id)).await.unwrap());
-    let left = objects.claim(&name, &generation(6));
-    objects.put(&left, Bytes::from_static(b"{}").into()).await.unwrap();
-    let jobs = objects.jobs(&name).await.unwrap();
-    let later = SystemTime::now() + Duration::from_secs(4000);
-    for (now, is_left) in [(SystemTime::now(), true), (later, false)] {
-        objects.sweep_claims(&name, &jobs, now).await.unwrap();
-        assert_eq!(objects.store.head(&left).await.is_ok(), is_left);
-        assert_eq!(objects.find_claim(&name, &key).await.unwrap(), Some((7, Some(claim_of(id)))));
+    assert!(objects.claim_key(&name, after_first.clone(), claim_of(late)).await.unwrap());
+    for stale in [after_first, empty] {
+        assert!(!objects.claim_key(&name, stale, claim_of(first)).await.unwrap());
     }
+    let after_late = objects.register(&name, &key).await.unwrap();
+    assert_eq!(after_late.claim(&key), Some(&claim_of(late)));
+}
+
+#[tokio::test]
+async fn a_sweep_leaves_the_last_generation_of_each_register() {
+    let objects = Objects::in_memory();
+    let (key, name) = (KeyHash::of(b"key"), owner());
+    let id = asked(&objects, b"").await;
+    let claim = Claim::new(key.clone(), id, "print".to_owned());
+    for _ in 0..2 {
+        let register = objects.register(&name, &key).await.unwrap();
+        assert!(objects.claim_key(&name, register, claim.clone()).await.unwrap());
+    }
+    // A replaced generation that was not deleted, and a claim of an earlier version.
+    let hash = blake3::hash(b"key").to_hex();
+    let register = &hash[..3];
+    for left in [&["claims", register, "0"][..], &["claims", &"0".repeat(64), "0"]] {
+        let left = objects.path(&[&[&*name.0], left].concat());
+        objects.put(&left, Bytes::from_static(b"{}").into()).await.unwrap();
+        objects.sweep_claims(&name).await.unwrap();
+        assert!(objects.store.head(&left).await.is_err());
+    }
+    assert_eq!(objects.register(&name, &key).await.unwrap().claim(&key), Some(&claim));
+}
+
+#[tokio::test]
+async fn a_long_register_loses_the_claims_of_deleted_jobs() {
+    let objects = Objects::in_memory();
+    let name = owner();
+    let of_register = |key: &KeyHash| serde_json::to_string(key).unwrap()[1..4].to_owned();
+    let first = KeyHash::of(b"0");
+    // Keys of one register, by trial.
+    let mut keys = (0..).map(|k: u64| KeyHash::of(k.to_string().as_bytes()));
+    let keys: Vec<_> =
+        std::iter::from_fn(|| keys.find(|key| of_register(key) == of_register(&first))).take(12).collect();
+    let mut ids = Vec::new();
+    for key in &keys {
+        let id = asked(&objects, b"").await;
+        let register = objects.register(&name, key).await.unwrap();
+        assert!(
+            objects.claim_key(&name, register, Claim::new(key.clone(), id, String::new())).await.unwrap()
+        );
+        ids.push(id);
+        if ids.len() == 6 {
+            for &id in &ids[..5] {
+                assert!(objects.delete_job(&name, id).await.unwrap());
+            }
+        }
+    }
+    let register = objects.register(&name, &first).await.unwrap();
+    let is_claimed: Vec<bool> = keys.iter().map(|key| register.claim(key).is_some()).collect();
+    assert_eq!(is_claimed, [vec![false; 5], vec![true; 7]].concat());
 }
 
 #[tokio::test]
