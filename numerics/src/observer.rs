@@ -30,6 +30,10 @@ pub trait Observer: Sync {
     /// Called when a system is solved, with the relative residual |Y − (K + αI)Λ|/|Y|.
     fn solved_to(&self, _relative_residual: f64) {}
 
+    /// Called when work ended long before its price was spent, so that its duration does not predict that of
+    /// similar work: an iteration that converged at once, or weights that were known.
+    fn ended_early(&self) {}
+
     /// Fails if the work should stop.
     ///
     /// # Errors
@@ -44,6 +48,10 @@ pub struct WithoutStages<'a>(pub &'a dyn Observer);
 
 impl Observer for WithoutStages<'_> {
     fn enter(&self, _stage: Stage) {}
+
+    fn ended_early(&self) {
+        self.0.ended_early();
+    }
 
     fn is_cancelled(&self) -> bool {
         self.0.is_cancelled()

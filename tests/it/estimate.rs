@@ -5,6 +5,7 @@ use std::time::Instant;
 use serde_json::{Value, json};
 
 use crate::common::random::Random;
+use crate::metrics::samples;
 use crate::routes::{ROUTES, route_of};
 use crate::support::{Answer, Server, document, fibonacci_sphere};
 
@@ -127,16 +128,73 @@ async fn what_would_be_refused_is_refused_with_the_same_problem() {
         .expect_problem(404, "unknown-cloud");
 }
 
-#[tokio::test]
-async fn what_takes_too_long_is_told_and_not_begun() {
-    let server = Server::with_flags(&["--deadline-seconds", "0.5"]).await;
-    let request = request("/v1/normals", 6000, 0.0);
+#[tokio::test(flavor = "multi_thread")]
+async fn what_takes_too_long_is_told_and_not_begun_unless_the_server_is_idle() {
+    let server = Server::with_flags(&["--deadline-seconds", "1"]).await;
+    let request = request("/v1/normals", 12_000, 0.0);
     let estimated = estimate(&server, "compute_normals", &request).await.expect_ok();
     assert_eq!(estimated["admissible"], false, "{estimated}");
-    // 6000³/3 flops at 20 Gflop/s, before any measurement.
-    assert!(estimated["seconds"].as_f64().unwrap() > 3.0, "{estimated}");
-    let problem = server.post("/v1/normals", &request).await.expect_problem(504, "deadline-exceeded");
-    assert!(problem["detail"].as_str().unwrap().contains("nothing was computed"), "{problem}");
+    // 12,000³/3 flops at 20 Gflop/s, before any measurement.
+    assert!(estimated["seconds"].as_f64().unwrap() > 20.0, "{estimated}");
+    let detail = |answer: &Answer| {
+        let problem = answer.expect_problem(504, "deadline-exceeded");
+        problem["detail"].as_str().unwrap().to_owned()
+    };
+    // Nobody waits for an idle server, so it tries, and the deadline ends what takes too long.
+    assert!(detail(&server.post("/v1/normals", &request).await).contains("no answer within 1 s"));
+    let slow = server.client.post(server.url("/v1/normals")).json(&request);
+    let slow = tokio::spawn(slow.send());
+    while samples(&server).await["gramian_compute_running{lane=\"exclusive\"}"] < 1.0 && !slow.is_finished() {
+    }
+    let refused = detail(&server.post("/v1/normals", &request).await);
+    assert!(slow.is_finished() || refused.contains("nothing was computed"), "{refused}");
+    assert_eq!(slow.await.unwrap().unwrap().status(), 504);
+}
+
+/// Sends a request with a key.
+async fn post_as(server: &Server, key: &str, path: &str, body: &Value) -> Answer {
+    server.send(server.client.post(server.url(path)).bearer_auth(key).json(body)).await
+}
+
+/// Returns the estimated seconds of an interpolation for a key.
+async fn seconds_as(server: &Server, key: &str, request: &Value) -> f64 {
+    let mut body = request.clone();
+    body["operation"] = json!("compute_interpolation");
+    let estimated = post_as(server, key, "/v1/estimate", &body).await.expect_ok();
+    estimated["seconds"].as_f64().unwrap()
+}
+
+/// Returns a request whose values take conjugate gradients no iteration if `scale` is 0.
+fn iterated(scale: f64) -> Value {
+    let points = fibonacci_sphere(2500);
+    let values: Vec<f64> = points.iter().map(|x| scale * (3.0 * x[0]).sin() + scale * x[1]).collect();
+    json!({
+        "cloud": {"points": points}, "values": values, "queries": points[..1], "solver": "iterative",
+        "kernel": {"family": "matern", "nu": 0.5, "length_scale": 0.5}, "alpha": 1e-6, "mean": "zero",
+    })
+}
+
+#[tokio::test]
+async fn what_one_key_sends_changes_the_estimates_of_another_by_at_most_a_factor_of_two() {
+    let server = Server::with_flags(&["--api-keys", "greedy,modest"]).await;
+    let known = |scale: f64| iterated(1.0 + scale);
+    post_as(&server, "modest", "/v1/interpolation", &known(0.0)).await.expect_ok();
+    post_as(&server, "greedy", "/v1/interpolation", &known(0.0)).await.expect_ok();
+    // Large enough that each request counts.
+    let mut body = known(0.5);
+    body["operation"] = json!("compute_interpolation");
+    let estimated = post_as(&server, "modest", "/v1/estimate", &body).await.expect_ok();
+    assert!(estimated["flops"].as_f64().unwrap() > 2e8, "{estimated}");
+    let (of_modest, of_greedy) =
+        (seconds_as(&server, "modest", &known(0.5)).await, seconds_as(&server, "greedy", &known(0.5)).await);
+    for _ in 0..12 {
+        post_as(&server, "greedy", "/v1/interpolation", &iterated(0.0)).await.expect_ok();
+    }
+    let after = seconds_as(&server, "modest", &known(0.5)).await;
+    assert!((0.499..=2.001).contains(&(after / of_modest)), "{of_modest} s before, {after} s after");
+    // Values that need no iteration say nothing of others, not even to the key that sent them.
+    let after = seconds_as(&server, "greedy", &known(0.5)).await;
+    assert!((0.999..=1.001).contains(&(after / of_greedy)), "{of_greedy} s before, {after} s after");
 }
 
 /// Dimensions in which estimated times are compared with measured ones.

@@ -126,7 +126,10 @@ impl Model {
         let solver = self.solver()?.clone();
         let sought = Sought { values, earlier: &known.earlier };
         let solution = match known.these {
-            Some(solution) => solution,
+            Some(solution) => {
+                solver.knows_weights(observer);
+                solution
+            }
             None => Arc::new(Solution::starting(&solver, sought, mean, observer)?),
         };
         Ok(Interpolant { solver, solution })
@@ -151,6 +154,7 @@ impl Model {
                 let signature = match signature.these {
                     None => Signature::fit_after(solver.clone(), &signature.earlier, observer)?,
                     Some(solution) => {
+                        solver.knows_weights(observer);
                         Signature::of(Interpolant { solver: solver.clone(), solution }, observer)?
                     }
                 };

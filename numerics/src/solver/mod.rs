@@ -58,6 +58,13 @@ impl Solver {
         self.system().cloud()
     }
 
+    /// Tells the observer that weights were known, where solving for them is much of the price of a function.
+    pub(crate) fn knows_weights(&self, observer: &dyn Observer) {
+        if self.landmarks().is_some() || self.iterative().is_some() {
+            observer.ended_early();
+        }
+    }
+
     pub fn kernel(&self) -> &Kernel {
         self.system().kernel()
     }

@@ -36,6 +36,7 @@ use std::time::Duration;
 
 use super::problem::Problem;
 use crate::store::Owner;
+use calibration::Calibration;
 pub use calibration::Work;
 use lane::Lane;
 pub use observer::{JobObserver, StageTimes};
@@ -93,12 +94,13 @@ impl Compute {
         n_owners: usize,
         deadline: Duration,
     ) -> Result<Self, rayon::ThreadPoolBuildError> {
+        let n_places = n_threads.saturating_add(max_queue);
         Ok(Self {
             light: Lane::new("gramian-light", n_threads, FairSemaphore::new(n_threads), 0)?,
             shared: Lane::new("gramian-shared", n_threads, FairSemaphore::new(n_threads), 2)?,
             exclusive: Lane::new("gramian-exclusive", n_threads, FairSemaphore::new(1), 5)?,
             jobs: Lane::new("gramian-jobs", n_threads, FairSemaphore::of_owners(1, n_owners), 10)?,
-            places: Places::new(n_threads.saturating_add(max_queue), n_owners, deadline),
+            places: Places::new(n_places, n_owners, deadline, Calibration::new(n_threads)),
             n_threads,
         })
     }
@@ -168,10 +170,23 @@ impl Compute {
         let lane = self.lane(flops, admission.is_job());
         let turn = lane.turn(admission.owner).await;
         admission.begin();
-        lane.run(turn, admission.progress.clone(), job).await.ok_or_else(panicked)
+        let done = lane.run(turn, admission.progress.clone(), job).await.ok_or_else(panicked)?;
+        admission.worked(done.1.whole);
+        if done.1.ended_early {
+            admission.forget_work();
+        }
+        Ok(done)
     }
 
-    /// Runs a small job for an answer that is being sent. Its request no longer holds a place.
+    /// Whether nothing runs or waits on the lane for work of so many flops.
+    pub fn is_idle_for(&self, admission: &Admission, flops: f64) -> bool {
+        self.lane(flops, admission.is_job()).load() == (0, 0)
+    }
+
+    /// Runs a job without a place, on the lane for its flops. The caller bounds the number of such jobs by
+    /// other means: the memory that they hold, or one job per connection.
+    ///
+    /// So answers can be sent, and clouds be read and listed, while all places are taken.
     ///
     /// # Errors
     /// Returns the errors of [`Compute::run`].

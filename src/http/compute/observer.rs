@@ -8,13 +8,16 @@ use super::progress::Progress;
 use super::pulse::Pulse;
 use gramian_numerics::observer::{Observer, Stage};
 
-/// Time spent in each stage of a job.
+/// Time spent in each stage of a job, and in all of it.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct StageTimes {
     pub gram: Duration,
     pub factor: Duration,
     pub solve: Duration,
     pub evaluate: Duration,
+    pub whole: Duration,
+    /// Whether the work ended long before its price was spent ([`Observer::ended_early`]).
+    pub ended_early: bool,
 }
 
 impl StageTimes {
@@ -34,6 +37,8 @@ pub struct JobObserver {
     pulse: Arc<Pulse>,
     /// Receives the stage and residual, if the request is watched.
     progress: Option<Arc<Progress>>,
+    began: Instant,
+    ended_early: AtomicBool,
     clock: Mutex<Clock>,
 }
 
@@ -57,7 +62,8 @@ impl JobObserver {
         pulse: Arc<Pulse>,
         progress: Option<Arc<Progress>>,
     ) -> Self {
-        Self { cancelled, pulse, progress, clock: Mutex::default() }
+        let (began, ended_early) = (Instant::now(), AtomicBool::new(false));
+        Self { cancelled, pulse, progress, began, ended_early, clock: Mutex::default() }
     }
 
     #[expect(clippy::disallowed_methods, reason = "a clock, for as long as it takes to read it")]
@@ -69,7 +75,8 @@ impl JobObserver {
     pub fn times(&self) -> StageTimes {
         let mut clock = self.clock();
         clock.stop();
-        clock.times
+        let ended_early = self.ended_early.load(Ordering::Relaxed);
+        StageTimes { whole: self.began.elapsed(), ended_early, ..clock.times }
     }
 }
 
@@ -87,6 +94,10 @@ impl Observer for JobObserver {
         if let Some(progress) = &self.progress {
             progress.solved_to(relative_residual);
         }
+    }
+
+    fn ended_early(&self) {
+        self.ended_early.store(true, Ordering::Relaxed);
     }
 
     fn is_cancelled(&self) -> bool {

@@ -30,6 +30,8 @@ struct Admitted {
     work: Option<(Work, f64)>,
     /// Time of the first turn after planning.
     begun: Option<Instant>,
+    /// Time in turns since planning, without waits for them.
+    worked: Duration,
 }
 
 /// A place among the admitted requests, held until the answer is ready. Work that outlives its client holds
@@ -43,13 +45,14 @@ pub struct Admission {
 }
 
 impl Places {
-    pub(super) fn new(n_places: usize, n_owners: usize, deadline: Duration) -> Arc<Self> {
-        let state = State {
-            admitted: HashMap::new(),
-            by_owner: HashMap::new(),
-            n_admissions: 0,
-            calibration: Calibration::default(),
-        };
+    pub(super) fn new(
+        n_places: usize,
+        n_owners: usize,
+        deadline: Duration,
+        calibration: Calibration,
+    ) -> Arc<Self> {
+        let state =
+            State { admitted: HashMap::new(), by_owner: HashMap::new(), n_admissions: 0, calibration };
         Arc::new(Self {
             n_places,
             share: share_of_one(n_places, n_owners),
@@ -65,7 +68,9 @@ impl Places {
         let id = state.n_admissions;
         state.n_admissions += 1;
         *state.by_owner.entry(owner).or_default() += 1;
-        state.admitted.insert(id, Admitted { owner, since: Instant::now(), work: None, begun: None });
+        let admitted =
+            Admitted { owner, since: Instant::now(), work: None, begun: None, worked: Duration::ZERO };
+        state.admitted.insert(id, admitted);
         Ok(Admission { places: self.clone(), id, owner, progress: Progress::of_this_task() })
     }
 
@@ -122,7 +127,7 @@ impl Admission {
     /// Sets the total cost of the request. Returns the expected seconds.
     pub fn set_work(&self, work: Work) -> f64 {
         let mut state = self.places.state();
-        let seconds = state.calibration.seconds(work);
+        let seconds = state.calibration.seconds(self.owner, work);
         if let Some(admitted) = state.admitted.get_mut(&self.id) {
             admitted.work = Some((work, seconds));
         }
@@ -139,7 +144,7 @@ impl Admission {
 
     /// Expected seconds of some work, once its turn has come.
     pub fn expected_seconds(&self, work: Work) -> f64 {
-        self.places.state().calibration.seconds(work)
+        self.places.state().calibration.seconds(self.owner, work)
     }
 
     /// Excludes this request from the calibration, because its duration is not representative.
@@ -161,18 +166,28 @@ impl Admission {
         }
     }
 
-    /// Records that the request was computed to its end. Its duration calibrates later predictions.
+    /// Adds the time of a turn that has ended.
+    pub(super) fn worked(&self, took: Duration) {
+        if let Some(admitted) = self.places.state().admitted.get_mut(&self.id)
+            && admitted.work.is_some()
+        {
+            admitted.worked += took;
+        }
+    }
+
+    /// Records that the request was computed to its end. Its time in turns calibrates later predictions. The
+    /// waits between them say how busy the server was.
     pub fn finish(&self) {
         let mut state = self.places.state();
         let admitted = state.admitted.get(&self.id);
-        let Some(Admitted { work: Some((work, _)), begun: Some(begun), .. }) = admitted else { return };
-        let (work, seconds) = (*work, begun.elapsed().as_secs_f64());
-        state.calibration.learn(work, seconds);
+        let Some(Admitted { work: Some((work, _)), begun: Some(_), worked, .. }) = admitted else { return };
+        let (work, seconds) = (*work, worked.as_secs_f64());
+        state.calibration.learn(self.owner, work, seconds);
     }
 
     /// Calibrates with work that was done at once, in the turn that planned it.
     pub fn did_at_once(&self, work: Work, took: Duration) {
-        self.places.state().calibration.learn(work, took.as_secs_f64());
+        self.places.state().calibration.learn(self.owner, work, took.as_secs_f64());
     }
 }
 
@@ -199,7 +214,7 @@ mod tests {
 
     #[test]
     fn one_owner_leaves_half_of_the_places_to_the_others() {
-        let places = Places::new(4, 2, DEADLINE);
+        let places = Places::new(4, 2, DEADLINE, Calibration::new(1));
         let of_a: Vec<_> = (0..2).map(|_| places.take(A).ok().unwrap()).collect();
         assert_eq!(places.look(A), Err(1));
         let of_b: Vec<_> = (0..2).map(|_| places.take(B).ok().unwrap()).collect();
@@ -212,7 +227,7 @@ mod tests {
 
     #[test]
     fn a_place_is_free_when_the_first_of_those_who_began_has_ended() {
-        let places = Places::new(3, 1, DEADLINE);
+        let places = Places::new(3, 1, DEADLINE, Calibration::new(1));
         let work = |flops| Work { operation: "", is_cached: false, flops };
         let [long, short, _waiting] = [1e12, 4e11, 1e9].map(|flops| {
             let admission = places.take(A).ok().unwrap();

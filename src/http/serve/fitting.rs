@@ -192,10 +192,12 @@ impl Fitting<'_> {
                 if matches!(outcome, CacheOutcome::Stored | CacheOutcome::NotStored) {
                     self.app.metrics.prepared(stored.kind());
                     factors::keep(self.app, plan, &stored);
-                    if stored.is_restored() {
-                        // The time for reading a factor does not predict the time for making one.
-                        self.admission.forget_work();
-                    }
+                }
+                let is_read = stored.is_restored() && outcome != CacheOutcome::Hit;
+                if is_read || outcome == CacheOutcome::Collapsed {
+                    // The time for reading a factor, or for waiting for that of another request, does not
+                    // predict the time for making one.
+                    self.admission.forget_work();
                 }
                 report.found(&stored, outcome);
                 Ok(Some(Fitted { plan: plan.clone(), stored }))
@@ -218,12 +220,16 @@ impl Fitting<'_> {
     ) -> Result<Option<Arc<Surface>>, Problem> {
         let fits = &self.app.prepared;
         let (key, times) = (fitted.plan.key, Arc::new(OnceLock::new()));
+        let was_missing = memory.is_some();
         let begin = |memory: Reservation| {
             make_surface(self.app.clone(), self.admission.clone(), fitted, times.clone(), memory)
         };
         let found = fits.get_or_make_surface(key, &fitted.stored, memory, begin).await;
-        if let Some(&times) = times.get() {
-            report.made_surface(times);
+        match times.get() {
+            Some(&times) => report.made_surface(times),
+            // Another request made it.
+            None if was_missing => self.admission.forget_work(),
+            None => {}
         }
         found.map_err(|failure| fitted.plan.failed(failure))
     }

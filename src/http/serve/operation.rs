@@ -151,7 +151,7 @@ async fn compute<O: Operation>(
     let mut report = AnswerHeaders::parsed_in(call.began.elapsed(), plan.main.stored.id);
     let fitting = Fitting { app, admission, has_surface: plan.has_surface };
     let outlook = fitting.outlook(&plan.main, plan.surface.as_ref(), plan.cost);
-    within_deadline(app, admission, admission.set_work(outlook.as_work(O::NAME)))?;
+    within_deadline(app, admission, outlook.as_work(O::NAME))?;
     let (fits, memory) = fitting.fits(&plan.main, plan.surface.as_ref(), plan.cost, &mut report).await?;
     let flops = plan.cost.flops();
     let job = move |observer: &JobObserver| answer::<O>(*plan, &fits, memory, report, wanted, observer);
@@ -164,14 +164,18 @@ async fn compute<O: Operation>(
 /// yet.
 const DOUBT: f64 = 4.0;
 
-fn within_deadline(app: &App, admission: &Admission, seconds: f64) -> Result<(), Problem> {
+/// Records the work of a request. Refuses it where other requests would wait for work that is not expected to
+/// end in time. An idle server tries it all the same, and learns from it if the estimate was wrong.
+fn within_deadline(app: &App, admission: &Admission, work: Work) -> Result<(), Problem> {
     let Config { deadline_seconds, job_seconds, .. } = app.config;
     let deadline = if admission.is_job() { job_seconds } else { deadline_seconds };
-    if seconds <= DOUBT * deadline {
+    let seconds = admission.set_work(work);
+    if seconds <= DOUBT * deadline || app.compute.is_idle_for(admission, work.flops) {
         return Ok(());
     }
     let detail = format!(
-        "this would take about {seconds:.0} s, longer than the deadline of {deadline} s; nothing was computed"
+        "this would take about {seconds:.0} s, longer than the deadline of {deadline} s, and other work is under way; \
+         nothing was computed"
     );
     Err(Problem::new(Slug::DeadlineExceeded, detail))
 }
@@ -352,9 +356,12 @@ fn planned<O: Operation>(
         Some(((fits, memory), wanted)) => {
             let fresh = plan.fresh.clone();
             let work = Work { operation: O::NAME, is_cached: true, flops: plan.cost.flops() };
-            let began = Instant::now();
+            let before = observer.times();
             let answered = answer::<O>(plan, &fits, memory, report, wanted, observer)?;
-            admission.did_at_once(work, began.elapsed());
+            let after = observer.times();
+            if !after.ended_early {
+                admission.did_at_once(work, after.whole - before.whole);
+            }
             Planned::Done(Prepared::Answered(Box::new(answered), fresh))
         }
     }))

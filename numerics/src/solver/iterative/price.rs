@@ -7,7 +7,7 @@ use crate::sums::fast::FastSums;
 use crate::sums::price::pair_flops;
 
 /// Iterations that prices assume. Matérn kernels and Laplace take 5 to 15 to a residual of 1e-8.
-const EXPECTED: f64 = 8.0;
+pub(crate) const EXPECTED_ITERATIONS: f64 = 8.0;
 
 /// Pairs that a fast product takes for each point. A tenth of it is enough for the last iterations.
 const FAST_PAIRS: f64 = 30_000.0;
@@ -24,7 +24,7 @@ pub(crate) fn iterative_price(n_points: usize, dimension: usize) -> Price {
 /// the residual.
 pub(crate) fn iterative_fit_price(n_points: usize, dimension: usize) -> Price {
     let n = n_points as f64;
-    let pairs = EXPECTED * n * pairs_per_point(n_points, dimension, 0.5) + 0.5 * n * n;
+    let pairs = EXPECTED_ITERATIONS * n * pairs_per_point(n_points, dimension, 0.5) + 0.5 * n * n;
     Price::of_numbers(n_points.saturating_mul(20), pairs * pair_flops(dimension, 0))
 }
 
@@ -34,7 +34,7 @@ pub(crate) fn iterative_covariances_price(held: usize, sizes: Sizes) -> Price {
     let Sizes { n_points, n_queries, dimension } = sizes;
     let (n, blocks) = (n_points as f64, n_queries.div_ceil(SOLVED_AT_ONCE) as f64);
     let of_pair = blocks * pair_flops(dimension, 0) + 2.0 * n_queries as f64;
-    let flops = EXPECTED * n * pairs_per_point(n_points, dimension, 1.0) * of_pair;
+    let flops = EXPECTED_ITERATIONS * n * pairs_per_point(n_points, dimension, 1.0) * of_pair;
     let columns = 5 * n_queries.min(held) + 16 * n_queries.min(SOLVED_AT_ONCE);
     Price::of_numbers(n_points.saturating_mul(columns), flops)
 }

@@ -8,10 +8,14 @@ use crate::observer::Observer;
 use crate::solver::Solver;
 use crate::solver::conjugate_gradients::{Goal, Preconditioned, SAFETY, SLACK, conjugate_gradients};
 use crate::solver::iterative::Iterative;
+use crate::solver::iterative::price::EXPECTED_ITERATIONS;
 use crate::solver::landmark::{Landmarks, TrueResidual};
 
 /// Largest number of times that conjugate gradients begin, the last ones with what is left.
 const RESTARTS: usize = 3;
+
+/// Part of the iterations that prices assume. A solve with fewer says nothing of the duration of others.
+const LEAST_OF_PRICE: f64 = 0.5;
 
 /// Relative residual of the true system at which weights by landmarks are as good as those of a factor.
 const LANDMARK_TOLERANCE: f64 = 1e-11;
@@ -75,6 +79,9 @@ impl Solution {
         };
         let iteration = Iteration { of: iterative, start, tolerance };
         let solution = iteration.run(solver, values, observer)?;
+        if solution.n_iterations.is_some_and(|n| (n as f64) < LEAST_OF_PRICE * EXPECTED_ITERATIONS) {
+            observer.ended_early();
+        }
         let relative_residual = solution.relative_residual;
         if relative_residual.is_nan() || relative_residual > tolerance {
             return Err(iterative.not_converged(relative_residual));
