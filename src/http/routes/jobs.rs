@@ -34,10 +34,6 @@ const TELLING: Duration = Duration::from_millis(500);
 /// Time by which a wait for a result ends before the deadline of its request.
 const MARGIN: Duration = Duration::from_secs(1);
 
-/// Bytes of a result that one reader may hold: pieces in the buffers of hyper, and one on its way from the
-/// store. They stay reserved until the answer is sent.
-const BYTES_UNDER_WAY: usize = 256 << 10;
-
 /// Look at a job
 ///
 /// Returns the state of a job: whether it waits, is being computed or has ended, its progress, and how long
@@ -200,7 +196,8 @@ pub async fn get_job_result(
         let document = problem_of(found).await?;
         return Ok((status, Extension(Documented(document))).into_response());
     }
-    let n_bytes = usize::try_from(found.n_body_bytes).unwrap_or(usize::MAX).min(BYTES_UNDER_WAY);
+    let most = app.jobs.objects.bytes_per_reader();
+    let n_bytes = usize::try_from(found.n_body_bytes).unwrap_or(usize::MAX).min(most);
     let memory = app.prepared.try_reserve(owner, n_bytes).ok_or_else(|| app.compute.out_of_memory())?;
     let mut response = Body::from_stream(holding(found.body, memory)).into_response();
     restore_headers(response.headers_mut(), &found.head.headers);

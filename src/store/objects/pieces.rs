@@ -34,6 +34,11 @@ const PARTS_UNDER_WAY: usize = 4;
 /// Bytes handed to a reader at a time: some 50 µs of hashing.
 const PIECE: usize = 64 << 10;
 
+/// Bytes of an object that one reader may hold: pieces in the buffers of its connection, and one on its way
+/// from the store. The client of a bucket reads ahead, in two pieces of up to 408 KiB.
+const BYTES_PER_READER: usize = 256 << 10;
+const BYTES_PER_READER_OF_BUCKET: usize = 1 << 20;
+
 /// An object in the store, read as far as its first line.
 pub struct Found {
     pub line: Bytes,
@@ -52,6 +57,12 @@ pub enum BrokenOff {
 }
 
 impl Objects {
+    /// Most bytes of an object that one reader holds, however long it reads nothing.
+    pub fn bytes_per_reader(&self) -> usize {
+        let is_bucket = self.directory.is_none() && !self.in_memory;
+        if is_bucket { BYTES_PER_READER_OF_BUCKET } else { BYTES_PER_READER }
+    }
+
     /// Writes an object within its room. Returns its size in bytes.
     ///
     /// If the process ends meanwhile, a directory keeps the written part under another name until the next
