@@ -1,5 +1,5 @@
 //! Memory of large clouds on their way in and large answers on their way out, as multiples of the bytes of
-//! their arrays. Also the memory of learning from values, against its price.
+//! their arrays. Also the memory of learning from values and of the seeds of meshes, against their prices.
 //!
 //! This is a process of its own, because its allocator counts, and a single test, since the count covers all
 //! threads. Figures for 100,000 points hold for a million, since everything is proportional.
@@ -22,11 +22,19 @@ use gramian::http::wire::write::encode::Encoded;
 use gramian::store::Owner;
 use gramian::store::budget::Budget;
 use gramian::store::clouds::CloudStore;
+use gramian_numerics::function::interpolant::Interpolant;
+use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::selection::{Noise, Observed, learn, learning_price};
 use gramian_numerics::solver::trend::Mean;
+use gramian_numerics::solver::{Solver, System};
+use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::surface::mesh::fields::interpolant::LevelOf;
+use gramian_numerics::surface::mesh::price::{MeshSize, Within};
+use gramian_numerics::surface::mesh::surface::{MeshOptions, mesh_of_level};
+use gramian_numerics::surface::mesh::{Bounds, Quality};
 use http_body_util::BodyExt;
 use peak_alloc::PeakAlloc;
 use safetensors::Dtype;
@@ -143,6 +151,36 @@ fn learning_takes_what_it_is_priced() {
     }
 }
 
+/// A level between all points and their neighbours, with a step so short that each point has hundreds of seeds,
+/// in a box in which next to nothing is followed.
+fn seeds_take_what_they_are_priced() {
+    let n = 40_000;
+    let part = |k: usize, of: f64| (k as f64 * of).fract() - 0.5;
+    let point =
+        |k: usize| [part(k, 0.754_877_666_2), part(k, 0.569_840_290_9), 1e-4 * part(k, 0.618_033_988_7)];
+    let cloud = Arc::new(Cloud::new((0..n).flat_map(point).collect(), 3).unwrap());
+    let values: Vec<f64> = cloud.points().map(|x| x[2]).collect();
+    let kernel = Kernel::new(Family::Gauss, 4.0, 1.0).unwrap();
+    let system = System::new(cloud.clone(), kernel, Regularization::Uniform(1e-2)).unwrap();
+    let solver = Arc::new(Solver::landmark(system, &Unobserved).unwrap());
+    let function = Interpolant::fit_with_mean(solver, &values, Mean::Linear, &Unobserved).unwrap();
+    let (step, corner) = (1e-5, cloud.point(0));
+    let bounds = Bounds {
+        min: corner.iter().map(|x| x - 2.0 * step).collect(),
+        max: corner.iter().map(|x| x + 2.0 * step).collect(),
+    };
+    let spacing = Sampling::of(&cloud, &Unobserved).unwrap().scales().spacing;
+    let within = Some(Within::of(&bounds, &cloud, step, true));
+    let size = MeshSize { n_points: n, dimension: 3, step: step / spacing, within, quality: Quality::Raw };
+    let (step, bounds, max_nodes) = (Some(step), Some(bounds), size.max_nodes());
+    let options = MeshOptions { step, bounds, quality: Quality::Raw, is_open: false, max_nodes };
+    // Whether a surface is found in the box is of no interest here.
+    let (_, taken) = peak_of(|| mesh_of_level(LevelOf::new(&function, 0.0, 1e-4), &options, &Unobserved));
+    let priced = size.price(1e4).n_bytes;
+    println!("seeds of {n} points: {taken} bytes at the peak, priced {priced}");
+    assert!(taken <= priced + BASE_BYTES && priced <= 10 * (taken + BASE_BYTES), "{taken}, {priced}");
+}
+
 struct Numbers(Array);
 
 impl Answer for Numbers {
@@ -188,6 +226,7 @@ async fn clouds_come_in_and_answers_go_out_within_three_times_their_arrays() {
         assert!(counted <= 3.0 + ratio(BASE_BYTES) && beside < 1.5 + ratio(BASE_BYTES), "{name}: {counted}");
     }
     learning_takes_what_it_is_priced();
+    seeds_take_what_they_are_priced();
     let compute = Arc::new(Compute::new(2, 8, 1, Duration::from_secs(600)).unwrap());
     let budget = Budget::new(usize::MAX / 4, 1);
     let one = 8 * 20 * N;
