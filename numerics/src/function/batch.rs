@@ -128,7 +128,10 @@ mod tests {
                     }
                     let solution = &batch.solutions[at];
                     assert!((solution.energy - alone.solution.energy).abs() <= 1e-9 * alone.solution.energy);
-                    assert!(solution.relative_residual <= 1e-12);
+                    // A residual that is rounding (Higham 2002, th. 7.1) is not refined.
+                    let largest = solution.weights.iter().fold(0.0f64, |a, w| a.max(w.abs()));
+                    let rounding = f64::EPSILON * (solver.norm1() * largest + size);
+                    assert!(solution.relative_residual <= 1e-12 || solution.residual_max <= rounding);
                 }
             }
         }

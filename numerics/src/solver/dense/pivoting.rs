@@ -116,8 +116,8 @@ impl<'a> Pivoting<'a> {
         Self { tolerance, ..self }
     }
 
-    /// Gives up once the rank is predicted to exceed `doubt` times the largest one. The prediction takes equal
-    /// numbers of pivots for equal factors of the diagonal that remains.
+    /// Gives up once the rank is predicted to exceed `doubt` times the largest one. The prediction takes
+    /// equal numbers of pivots for equal factors of the diagonal that remains.
     pub(in crate::solver) fn doubting(self, doubt: f64) -> Self {
         Self { doubt, ..self }
     }
