@@ -2,11 +2,12 @@
 //!
 //! REGISTERS. The claims of an owner are spread over 4,096 registers by the hash of the key. A register is a
 //! folder, `<owner>/claims/<three digits of the hash>`. Its last generation, an object named by a number, has
-//! all its claims. A change writes the next generation, and creating it is exclusive. So a request that
-//! creates it has seen every claim to its key: none was made since it looked.
+//! all its claims. A change writes the next generation, and creating it is exclusive.
 //!
-//! THE LAST GENERATION is never deleted, so a number never returns. Otherwise a request that looked before a
-//! deletion, and one that looked after it, would create different generations, and both have a claim.
+//! THE LAST GENERATION is never deleted, but those before it are, so their numbers are free again. A request
+//! that looked long ago may create one of them. So whoever has created a generation looks whether it is the
+//! last one. If it is, its number was never taken before, and no claim was made since the request looked. If
+//! it is not, the last one says who has the key.
 //!
 //! DELETIONS of jobs leave claims alone. A job is written before it claims its key, so a claim to an unknown
 //! job is left over from a deleted one, and may be replaced.
@@ -131,14 +132,19 @@ impl Objects {
                 kept.push(other);
             }
         }
-        kept.push(claim);
-        let next = self.generation(owner, &key, last.map_or(0, |last| last + 1));
-        let is_claimed = self.create(&next, sealed(line_of(&kept))).await?;
-        if let Some(last) = last.filter(|_| is_claimed) {
-            // A generation that stays is removed by a sweep.
-            let _ = self.delete(&self.generation(owner, &key, last)).await;
+        kept.push(claim.clone());
+        let number = last.map_or(0, |last| last + 1);
+        let name = self.generation(owner, &key, number);
+        if !self.create(&name, sealed(line_of(&kept))).await? {
+            return Ok(false);
         }
-        Ok(is_claimed)
+        let newest = self.register(owner, &key).await?;
+        let replaced = if newest.last == Some(number) { last } else { Some(number) };
+        if let Some(replaced) = replaced {
+            // A generation that stays is removed by a sweep.
+            let _ = self.delete(&self.generation(owner, &key, replaced)).await;
+        }
+        Ok(newest.claims.contains(&claim))
     }
 
     async fn knows_job_of(&self, owner: &OwnerName, claim: &Claim) -> Result<bool, Unavailable> {

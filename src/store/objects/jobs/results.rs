@@ -102,7 +102,8 @@ impl Objects {
             return Ok(false);
         }
         if !self.find_job(owner, id).await?.is_some_and(|job| job.is_known()) {
-            self.clear_job(owner, id).await?;
+            // The rest is left to whoever deletes the job, and answers whether it was there.
+            self.delete(&self.job(owner, id, RESULT)).await?;
             return Ok(false);
         }
         self.unmark_open(owner, id).await?;
