@@ -50,11 +50,19 @@ impl InstructionSet {
         }
     }
 
+    /// Runs a loop that is compiled for each instruction set.
+    ///
+    /// `pulp::Arch::dispatch` would compile another copy of every loop, with one lane, that is never used.
     #[inline(always)]
     pub(crate) fn dispatch<Op: WithSimd>(self, op: Op) -> Op::Output {
         match self.0 {
-            pulp::Arch::Scalar => op.with_simd(Portable {}),
-            arch => arch.dispatch(op),
+            #[cfg(target_arch = "x86_64")]
+            pulp::Arch::V4(simd) => Simd::vectorize(simd, op),
+            #[cfg(target_arch = "x86_64")]
+            pulp::Arch::V3(simd) => Simd::vectorize(simd, op),
+            #[cfg(target_arch = "aarch64")]
+            pulp::Arch::Neon(simd) => Simd::vectorize(simd, op),
+            _ => op.with_simd(Portable {}),
         }
     }
 }
