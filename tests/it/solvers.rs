@@ -228,10 +228,10 @@ async fn beyond_what_is_factorized_auto_takes_landmarks_where_few_are_enough_and
 async fn auto_takes_landmarks_where_they_are_faster_than_all_points_and_have_their_digits() {
     let server = Server::start().await;
     for (n, kernel, alpha, expected) in [
-        (1500, smooth(), Some(1e-4), "landmark"),
-        (1500, smooth(), Some(1e-8), "dense"),
-        (1500, smooth(), None, "dense"),
-        (1500, rough(), Some(1e-4), "dense"),
+        (2000, smooth(), Some(1e-4), "landmark"),
+        (2000, smooth(), Some(1e-8), "dense"),
+        (2000, smooth(), None, "dense"),
+        (2000, rough(), Some(1e-4), "dense"),
         (999, smooth(), Some(1e-4), "dense"),
     ] {
         let points = fibonacci_sphere(n);
