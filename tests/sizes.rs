@@ -151,8 +151,8 @@ fn learning_takes_what_it_is_priced() {
     }
 }
 
-/// A level between all points and their neighbours, with a step so short that each point has hundreds of seeds,
-/// in a box in which next to nothing is followed.
+/// A level between all points and their neighbours, with a step so short that each point has hundreds of
+/// seeds, in a box in which next to nothing is followed.
 fn seeds_take_what_they_are_priced() {
     let n = 40_000;
     let part = |k: usize, of: f64| (k as f64 * of).fract() - 0.5;

@@ -21,7 +21,7 @@ mod sweep;
 
 use common::kernels::all_families;
 use fields::FIELDS;
-use flags::{Asked, Counts, Request};
+use flags::{Asked, Counts, Values};
 use rayon::prelude::*;
 use shapes::Shape;
 use sweep::NOISES;
@@ -41,25 +41,24 @@ fn main() {
     let of_noises: Vec<String> = NOISES.iter().map(|noise| format!("noise {} %", 100.0 * noise)).collect();
     println!("| kernel | {} | refused |", of_noises.join(" | "));
     println!("|---|{}---|", "---|".repeat(NOISES.len()));
-    let mut all = [Counts::default(); NOISES.len()];
-    for asked in asked {
-        let mut cells = Vec::new();
-        let mut n_refused = 0;
-        for (noise, all) in NOISES.into_iter().zip(&mut all) {
-            let mut requests = Vec::new();
-            for &n_points in &sizes {
-                for shape in SHAPES {
-                    requests.extend(FIELDS.map(|field| Request { asked, shape, field, n_points, noise }));
-                }
+    let of_noise = |noise: f64| {
+        let mut values = Vec::new();
+        for &n_points in &sizes {
+            for shape in SHAPES {
+                values.extend(FIELDS.map(|field| Values { shape, field, n_points, noise }));
             }
-            let counts: Vec<Counts> = requests.par_iter().map(|request| request.run(n_clouds)).collect();
-            let counts = counts.iter().fold(Counts::default(), Counts::plus);
-            n_refused += counts.n_refused;
-            *all = all.plus(&counts);
-            cells.push(cell(&counts));
         }
+        let counts: Vec<Vec<Counts>> = values.par_iter().map(|values| values.run(&asked, n_clouds)).collect();
+        let sum = |at: usize| counts.iter().map(|of| &of[at]).fold(Counts::default(), Counts::plus);
+        (0..asked.len()).map(sum).collect::<Vec<_>>()
+    };
+    let counts = NOISES.map(of_noise);
+    for (at, asked) in asked.iter().enumerate() {
+        let cells: Vec<String> = counts.iter().map(|of_noise| cell(&of_noise[at])).collect();
+        let n_refused: usize = counts.iter().map(|of_noise| of_noise[at].n_refused).sum();
         println!("| {asked:?} | {} | {n_refused} |", cells.join(" | "));
     }
+    let all = counts.map(|of_noise| of_noise.iter().fold(Counts::default(), Counts::plus));
     println!("| all | {} | |", all.map(|counts| cell(&counts)).join(" | "));
 }
 

@@ -40,9 +40,9 @@ pub enum Asked {
     Width(Family, f64),
 }
 
+/// Values of a field on clouds of a shape.
 #[derive(Debug, Clone, Copy)]
-pub struct Request {
-    pub asked: Asked,
+pub struct Values {
     pub shape: Shape,
     pub field: Field,
     pub n_points: usize,
@@ -81,67 +81,82 @@ const MAX_QUERIES: usize = 300;
 /// α for kernels that the request names.
 const ALPHA: f64 = 1e-10;
 
-impl Request {
-    /// Counts the answers for `n_clouds` clouds.
-    pub fn run(&self, n_clouds: usize) -> Counts {
-        (0..n_clouds).fold(Counts::default(), |sum, cloud| {
-            let counts = self.run_once(cloud).unwrap_or(Counts { n_refused: 1, ..Counts::default() });
-            sum.plus(&counts)
-        })
+impl Values {
+    /// Counts the answers to each request, for `n_clouds` clouds. `[asked]`
+    pub fn run(&self, asked: &[Asked], n_clouds: usize) -> Vec<Counts> {
+        let refused = Counts { n_refused: 1, ..Counts::default() };
+        let mut sums = vec![Counts::default(); asked.len()];
+        for cloud in 0..n_clouds {
+            let measured = Measured::of(self, cloud);
+            for (sum, &asked) in sums.iter_mut().zip(asked) {
+                let counts = measured.as_ref().ok().and_then(|measured| measured.counts(asked).ok());
+                *sum = sum.plus(&counts.unwrap_or(refused));
+            }
+        }
+        sums
     }
+}
 
-    fn run_once(&self, cloud: usize) -> Result<Counts, NumericsError> {
-        let mut random = Random((31 * self.n_points + 1001 * cloud) as u64 + 1);
-        let points = sample(self.shape, Sampling::Random, self.n_points, &mut random);
+/// One cloud with its values, what is learned from them, and the truth at its queries.
+struct Measured {
+    cloud: Arc<Cloud>,
+    queries: Cloud,
+    spacings: Spacings,
+    values: Vec<f64>,
+    learned: Learned,
+    truth: Vec<(Jet, Truth)>,
+}
+
+impl Measured {
+    fn of(of: &Values, cloud: usize) -> Result<Self, NumericsError> {
+        let mut random = Random((31 * of.n_points + 1001 * cloud) as u64 + 1);
+        let points = sample(of.shape, Sampling::Random, of.n_points, &mut random);
         let n = points.len();
-        let exact: Vec<f64> = points.iter().map(|&x| self.field.at(x).value).collect();
+        let exact: Vec<f64> = points.iter().map(|&x| of.field.at(x).value).collect();
         let mean = exact.iter().sum::<f64>() / n as f64;
         let spread = (exact.iter().map(|f| (f - mean).powi(2)).sum::<f64>() / n as f64).sqrt();
-        let values: Vec<f64> = exact.iter().map(|f| f + self.noise * spread * random.normal()).collect();
+        let values: Vec<f64> = exact.iter().map(|f| f + of.noise * spread * random.normal()).collect();
         let cloud = Arc::new(Cloud::new(points.concat(), 3).unwrap());
         let queries: Vec<[f64; 3]> = points.iter().step_by(n.div_ceil(MAX_QUERIES)).copied().collect();
-        let at = Cloud::new(queries.concat(), 3).unwrap();
         let spacings = Spacings::of(&cloud, &Unobserved)?;
-
         let (noise, mean) = (Noise::Unknown, Mean::Constant);
         let observed = Observed { cloud: &cloud, sampling: &spacings, values: &values, noise, mean };
         let learned = learn(observed, &Unobserved)?;
-        let (interpolant, factor) = self.function(&cloud, &spacings, &values, &learned)?;
-        let learned = Some(&learned).filter(|_| self.asked != Asked::Nothing);
-        let surface = self.surface(&cloud, &spacings)?;
-        let geometry = Geometry::of(&surface, &at, &GeometryRequest::CURVATURES, &Unobserved)?;
-        let truth: Vec<(Jet, Truth)> =
-            queries.iter().map(|&x| (self.field.at(x), self.shape.truth(x))).collect();
-        let judged = |found| Judged {
-            geometry: &geometry,
-            interpolant: &interpolant,
-            factor,
-            queries: &at,
-            found,
-            learned,
-        };
-        let mut counts = Counts::default();
+        let truth = queries.iter().map(|&x| (of.field.at(x), of.shape.truth(x))).collect();
+        let queries = Cloud::new(queries.concat(), 3).unwrap();
+        Ok(Self { cloud, queries, spacings, values, learned, truth })
+    }
 
-        let found = Operator::SurfaceGradient.apply(&geometry, &interpolant, &at, &Unobserved)?;
-        let doubts = judged(&found).judge(Operator::SurfaceGradient, &Unobserved)?;
-        let exact: Vec<f64> = truth.iter().flat_map(|(jet, on)| tangential(jet, on)).collect();
-        counts.add(0, &found, &exact, &geometry, &doubts);
-        let found = Operator::LaplaceBeltrami.apply(&geometry, &interpolant, &at, &Unobserved)?;
-        let doubts = judged(&found).judge(Operator::LaplaceBeltrami, &Unobserved)?;
-        let exact: Vec<f64> = truth.iter().map(|(jet, on)| laplacian(jet, on)).collect();
-        counts.add(1, &found, &exact, &geometry, &doubts);
+    fn counts(&self, asked: Asked) -> Result<Counts, NumericsError> {
+        let (interpolant, factor) = self.function(asked)?;
+        let geometry =
+            Geometry::of(&self.surface(asked)?, &self.queries, &GeometryRequest::CURVATURES, &Unobserved)?;
+        let mut counts = Counts::default();
+        let mut count = |operator: Operator, at: usize, exact: &[f64]| {
+            let found = operator.apply(&geometry, &interpolant, &self.queries, &Unobserved)?;
+            let judged = Judged {
+                geometry: &geometry,
+                interpolant: &interpolant,
+                factor,
+                queries: &self.queries,
+                found: &found,
+                learned: Some(&self.learned).filter(|_| asked != Asked::Nothing),
+            };
+            let doubts = judged.judge(operator, &Unobserved)?;
+            counts.add(at, &found, exact, &geometry, &doubts);
+            Ok::<_, NumericsError>(())
+        };
+        let exact: Vec<f64> = self.truth.iter().flat_map(|(jet, on)| tangential(jet, on)).collect();
+        count(Operator::SurfaceGradient, 0, &exact)?;
+        let exact: Vec<f64> = self.truth.iter().map(|(jet, on)| laplacian(jet, on)).collect();
+        count(Operator::LaplaceBeltrami, 1, &exact)?;
         Ok(counts)
     }
 
     /// The fit of the values, and the variance by which its unit kernel is multiplied.
-    fn function(
-        &self,
-        cloud: &Arc<Cloud>,
-        spacings: &Spacings,
-        values: &[f64],
-        learned: &Learned,
-    ) -> Result<(Interpolant, f64), NumericsError> {
-        let (family, length_scale) = match self.asked {
+    fn function(&self, asked: Asked) -> Result<(Interpolant, f64), NumericsError> {
+        let Self { cloud, spacings, values, learned, .. } = self;
+        let (family, length_scale) = match asked {
             Asked::Nothing => {
                 let kernel = Kernel::new(learned.family, learned.length_scale, 1.0)?;
                 let solver = solver(cloud, kernel, learned.ratio)?;
@@ -157,9 +172,10 @@ impl Request {
         Ok((Interpolant::fit(solver, values, &Unobserved)?, 1.0))
     }
 
-    fn surface(&self, cloud: &Arc<Cloud>, spacings: &Spacings) -> Result<Surface, NumericsError> {
+    fn surface(&self, asked: Asked) -> Result<Surface, NumericsError> {
+        let Self { cloud, spacings, .. } = self;
         let scales = spacings.scales();
-        let (kernel, alpha) = match self.asked {
+        let (kernel, alpha) = match asked {
             Asked::Nothing => {
                 let noise = estimate_noise(cloud, spacings, &Unobserved)?;
                 default_fit(scales, Purpose::Curvatures, || noise)?
