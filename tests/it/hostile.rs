@@ -186,9 +186,9 @@ async fn cpu_seconds_to_join(process: &Process, body: Vec<u8>) -> f64 {
 }
 
 /// Joins regions again and again with the key `greedy`.
-async fn join_regions_forever(process: &Process, body: &Vec<u8>) {
+async fn join_regions_forever(process: &Process, body: &[u8]) {
     loop {
-        join_regions(process, "greedy", body.clone()).await;
+        join_regions(process, "greedy", body.to_owned()).await;
     }
 }
 
