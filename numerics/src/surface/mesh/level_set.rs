@@ -29,7 +29,7 @@ pub enum Quality {
 
 /// Places from which a surface is followed, `[s, d]`: those of the points of a range.
 ///
-/// There may be hundreds for a point, so no more are made at once than for [`SEEDING_POINTS`].
+/// There may be hundreds for a point, so no more are made at once than for `SEEDING_POINTS`.
 pub type Seeds<'a> = dyn Fn(Range<usize>, &dyn Observer) -> Result<Vec<f64>> + Sync + 'a;
 
 /// Points whose seeds are made at once.
