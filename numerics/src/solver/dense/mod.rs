@@ -11,4 +11,4 @@ pub(crate) use cholesky::factorize_in_place;
 pub(super) use cholesky::{Cholesky, pieces};
 pub(super) use pivoted_cholesky::PivotedCholesky;
 pub(crate) use pivoting::PIVOT_TOLERANCE;
-pub(super) use pivoting::{Pivoting, Tolerance};
+pub(super) use pivoting::{Pivoting, Step, Tolerance};

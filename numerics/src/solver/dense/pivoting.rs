@@ -50,8 +50,16 @@ pub(in crate::solver) struct Pivoting<'a> {
     columns: &'a mut [f64],
     rank: usize,
     tolerance: Tolerance,
-    /// Factor by which the predicted rank must exceed the largest one before the factorization gives up.
-    doubt: f64,
+}
+
+/// What a block of pivots has led to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::solver) enum Step {
+    /// No more remains than is tolerated.
+    Complete,
+    /// More pivots are needed than fit.
+    Full,
+    Further,
 }
 
 /// Largest diagonal entry that may remain.
@@ -107,19 +115,12 @@ impl<'a> Pivoting<'a> {
         let remaining = (0..n).map(|point| kernel.at_zero() + regularization.at(point)).collect();
         let order = (0..n).collect();
         let (nodes, tolerance) = (Nodes::of(cloud), Tolerance::rounding(kernel));
-        let doubt = f64::INFINITY;
-        Self { cloud, kernel, regularization, nodes, order, remaining, columns, rank: 0, tolerance, doubt }
+        Self { cloud, kernel, regularization, nodes, order, remaining, columns, rank: 0, tolerance }
     }
 
     /// Ends where as much remains as is tolerated.
     pub(in crate::solver) fn to(self, tolerance: Tolerance) -> Self {
         Self { tolerance, ..self }
-    }
-
-    /// Gives up once the rank is predicted to exceed `doubt` times the largest one. The prediction takes
-    /// equal numbers of pivots for equal factors of the diagonal that remains.
-    pub(in crate::solver) fn doubting(self, doubt: f64) -> Self {
-        Self { doubt, ..self }
     }
 
     /// Adds pivots until the largest remaining diagonal entry is tolerated, or until more than `max_rank`
@@ -128,35 +129,52 @@ impl<'a> Pivoting<'a> {
     /// # Errors
     /// `NumericsError::Cancelled`.
     pub(in crate::solver) fn run(mut self, max_rank: usize, observer: &dyn Observer) -> Result<Pivots> {
-        let is_complete = loop {
-            observer.checkpoint()?;
-            let largest = self.remaining[self.rank..].iter().copied().fold(0.0, f64::max);
-            let tolerance = self.tolerance.at(self.rank);
-            if largest <= tolerance {
-                break true;
+        loop {
+            let step = self.step(max_rank, observer)?;
+            if step != Step::Further {
+                let is_complete = step == Step::Complete;
+                return Ok(Pivots { order: self.order, rank: self.rank, is_complete });
             }
-            let progress = self.tolerance.progress(largest, self.rank, self.kernel.at_zero());
-            if self.rank as f64 > self.doubt * max_rank as f64 * progress {
-                break false;
-            }
-            let floor = tolerance.max(WORTH * largest);
-            let n_candidates = self.gather_candidates(floor);
-            let mut block = self.schur_complement(n_candidates, observer)?;
-            for k in 0..n_candidates {
-                // This number has the rounding of one sum instead of many, so that no candidate comes back
-                // forever.
-                self.remaining[self.rank + k] = block.diagonal(k);
-            }
-            let swaps = block.factorize(floor);
-            if self.rank + swaps.len() > max_rank {
-                break false;
-            }
-            self.swap_rows(&swaps);
-            if !swaps.is_empty() {
-                self.append(&block, swaps.len(), observer)?;
-            }
-        };
-        Ok(Pivots { order: self.order, rank: self.rank, is_complete })
+        }
+    }
+
+    /// Adds the pivots of one block, unless the largest remaining diagonal entry is tolerated.
+    ///
+    /// # Errors
+    /// `NumericsError::Cancelled`.
+    pub(in crate::solver) fn step(&mut self, max_rank: usize, observer: &dyn Observer) -> Result<Step> {
+        observer.checkpoint()?;
+        let (largest, tolerance) = (self.largest_remaining(), self.tolerance.at(self.rank));
+        if largest <= tolerance {
+            return Ok(Step::Complete);
+        }
+        let floor = tolerance.max(WORTH * largest);
+        let n_candidates = self.gather_candidates(floor);
+        let mut block = self.schur_complement(n_candidates, observer)?;
+        for k in 0..n_candidates {
+            // This number has the rounding of one sum instead of many, so that no candidate comes back
+            // forever.
+            self.remaining[self.rank + k] = block.diagonal(k);
+        }
+        let swaps = block.factorize(floor);
+        if self.rank + swaps.len() > max_rank {
+            return Ok(Step::Full);
+        }
+        self.swap_rows(&swaps);
+        if !swaps.is_empty() {
+            self.append(&block, swaps.len(), observer)?;
+        }
+        Ok(Step::Further)
+    }
+
+    /// Number of pivots.
+    pub(in crate::solver) fn rank(&self) -> usize {
+        self.rank
+    }
+
+    /// Largest diagonal entry of `K + D − LLᵀ`.
+    pub(in crate::solver) fn largest_remaining(&self) -> f64 {
+        self.remaining[self.rank..].iter().copied().fold(0.0, f64::max)
     }
 
     /// Moves the rows with the largest remaining entries above `floor` behind the pivots. Returns their

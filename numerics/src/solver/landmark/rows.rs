@@ -146,21 +146,6 @@ impl Rows {
         self.kept = Some(Kept { remaining, numbers });
     }
 
-    /// Returns the largest entry that remains of the diagonal at some points, V².
-    ///
-    /// # Errors
-    /// [`crate::error::NumericsError::Cancelled`].
-    pub(super) fn largest_remaining(
-        &self,
-        kernel: &Kernel,
-        at: &Cloud,
-        observer: &dyn Observer,
-    ) -> Result<f64> {
-        let mut numbers = vec![0.0; self.n_landmarks() * at.n_points()];
-        let remaining = self.fill(kernel, at, &mut numbers, observer)?;
-        Ok(remaining.into_iter().fold(0.0, f64::max))
-    }
-
     /// Bytes of the rows that are kept.
     pub(super) fn n_bytes_kept(&self) -> usize {
         self.kept.as_ref().map_or(0, |kept| vec_bytes(&kept.remaining) + vec_bytes(&kept.numbers))

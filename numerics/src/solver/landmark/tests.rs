@@ -193,13 +193,15 @@ fn a_few_hundred_points_tell_how_many_landmarks_all_need() {
         (torus.clone(), Family::Gauss, 1.75),
         (torus.clone(), Family::InverseMultiquadric, 8.0),
         (torus.clone(), Family::Matern { order: 8 }, 6.0),
+        (line(2_500), Family::Gauss, 0.02),
+        (in_two_places(&fibonacci_sphere(1_250)), Family::Gauss, 1.5),
     ] {
         let kernel = Kernel::new(family, length_scale, 1.7).unwrap();
         let expected = expected_landmarks(&cloud, &kernel, &noise, 500, &Unobserved).unwrap().unwrap();
         let system = System::new(Arc::new(cloud), kernel, noise.clone()).unwrap();
         let needed = Solver::landmark(system, &Unobserved).unwrap().rank();
         let ratio = expected as f64 / needed as f64;
-        assert!((0.7..1.4).contains(&ratio), "{family:?} {length_scale}: {expected}, {needed}");
+        assert!((0.75..1.25).contains(&ratio), "{family:?} {length_scale}: {expected}, {needed}");
     }
     for (family, length_scale) in
         [(Family::Matern { order: 2 }, 0.3), (Family::Gauss, 0.2), (Family::Laplace { epsilon: 0.0 }, 2.0)]
@@ -238,6 +240,17 @@ fn a_rough_kernel_is_given_up_after_a_block_of_pivots() {
     let (smooth, rough) =
         (n_checkpoints(1.75, Family::Gauss), n_checkpoints(0.3, Family::Matern { order: 2 }));
     assert!(2 * rough < smooth, "{rough} of {smooth} checkpoints");
+}
+
+/// Points of the unit interval, in their order.
+fn line(n: usize) -> Cloud {
+    Cloud::new((0..n).map(|i| i as f64 / n as f64).collect(), 1).unwrap()
+}
+
+/// A cloud, and the same far away.
+fn in_two_places(cloud: &Cloud) -> Cloud {
+    let moved = cloud.coordinates().iter().map(|x| x + 100.0);
+    Cloud::new(cloud.coordinates().iter().copied().chain(moved).collect(), 3).unwrap()
 }
 
 /// Random points of a torus of radii 2 and ½.
