@@ -1,6 +1,9 @@
 //! The solvers `landmark` and `iterative` over HTTP: the answers of the dense one, what they say of
 //! themselves, and their refusals.
 
+use std::time::Duration;
+
+use futures_util::future::join_all;
 use serde_json::{Value, json};
 
 use crate::support::{Server, fibonacci_sphere, numbers};
@@ -256,6 +259,47 @@ async fn auto_takes_landmarks_where_they_are_faster_than_all_points_and_have_the
         let dense = server.post("/v1/posterior", &body).await.expect_ok();
         check_near(&answer["means"], &dense["means"], 1e-10);
         check_near(&answer["variances"], &dense["variances"], 1e-6);
+    }
+}
+
+/// A request for which `auto` looks for landmarks: values on the sphere, in other units and places.
+fn probed(unit: f64, offset: f64) -> Value {
+    let sphere = fibonacci_sphere(2000);
+    let values: Vec<f64> = sphere.iter().map(|x| unit * (2.0 * x[0]).sin()).collect();
+    let moved = |x: &[f64; 3]| x.map(|x| unit * (x + offset));
+    let points: Vec<[f64; 3]> = sphere.iter().map(moved).collect();
+    json!({"cloud": {"points": points}, "values": values, "queries": [moved(&[0.6, 0.8, 0.0])],
+        "alpha": 1e-4 * unit * unit,
+        "kernel": {"family": "gauss", "length_scale": unit, "variance": unit * unit}})
+}
+
+#[tokio::test]
+async fn eight_equal_requests_share_a_look_for_landmarks_and_one_that_leaves_spoils_nothing() {
+    let server = Server::start().await;
+    let body = probed(1.0, 0.0);
+    let leaving = async {
+        let left = tokio::time::timeout(Duration::from_millis(30), server.post("/v1/interpolation", &body));
+        left.await.is_err()
+    };
+    let staying = join_all((0..8).map(|_| server.post("/v1/interpolation", &body)));
+    let (_, answers) = tokio::join!(leaving, staying);
+    let answers: Vec<Value> = answers.into_iter().map(|answer| answer.expect_ok()).collect();
+    for answer in &answers {
+        assert_eq!(answer["diagnostics"]["solver"], "landmark");
+        assert_eq!(answer["values"], answers[0]["values"]);
+    }
+}
+
+#[tokio::test]
+async fn landmarks_are_found_whatever_the_units_and_the_place() {
+    let server = Server::start().await;
+    let expected = server.post("/v1/interpolation", &probed(1.0, 0.0)).await.expect_ok();
+    for (unit, offset) in [(1e-6, 0.0), (1e6, 0.0), (1.0, 1e4)] {
+        let answer = server.post("/v1/interpolation", &probed(unit, offset)).await.expect_ok();
+        assert_eq!(answer["diagnostics"]["solver"], "landmark", "{unit}, {offset}");
+        let [found, expected] = [&answer, &expected].map(|answer| numbers(&answer["values"])[0]);
+        // Coordinates of 1e4 have lost four of sixteen digits.
+        assert!((found / unit - expected).abs() < 1e-8, "{unit}, {offset}: {found}, {expected}");
     }
 }
 

@@ -52,7 +52,7 @@ pub(in crate::solver) struct Pivoting<'a> {
     tolerance: Tolerance,
 }
 
-/// What a block of pivots has led to.
+/// Outcome of a block of pivots.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::solver) enum Step {
     /// No more remains than is tolerated.
