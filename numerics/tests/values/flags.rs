@@ -87,9 +87,9 @@ impl Values {
         let refused = Counts { n_refused: 1, ..Counts::default() };
         let mut sums = vec![Counts::default(); asked.len()];
         for cloud in 0..n_clouds {
-            let measured = Measured::of(self, cloud);
+            let on_cloud = OnCloud::of(self, cloud);
             for (sum, &asked) in sums.iter_mut().zip(asked) {
-                let counts = measured.as_ref().ok().and_then(|measured| measured.counts(asked).ok());
+                let counts = on_cloud.as_ref().ok().and_then(|on_cloud| on_cloud.counts(asked).ok());
                 *sum = sum.plus(&counts.unwrap_or(refused));
             }
         }
@@ -97,8 +97,8 @@ impl Values {
     }
 }
 
-/// One cloud with its values, what is learned from them, and the truth at its queries.
-struct Measured {
+/// A cloud with its values, the kernel learned from them, and the exact answers at its queries.
+struct OnCloud {
     cloud: Arc<Cloud>,
     queries: Cloud,
     spacings: Spacings,
@@ -107,7 +107,7 @@ struct Measured {
     truth: Vec<(Jet, Truth)>,
 }
 
-impl Measured {
+impl OnCloud {
     fn of(of: &Values, cloud: usize) -> Result<Self, NumericsError> {
         let mut random = Random((31 * of.n_points + 1001 * cloud) as u64 + 1);
         let points = sample(of.shape, Sampling::Random, of.n_points, &mut random);

@@ -7,7 +7,7 @@
 //! THE LAST GENERATION is never deleted, but those before it are, so their numbers are free again. A request
 //! that looked long ago may create one of them. So whoever has created a generation looks whether it is the
 //! last one. If it is, its number was never taken before, and no claim was made since the request looked. If
-//! it is not, the last one says who has the key.
+//! it is not, the key belongs to the job that the last one names.
 //!
 //! DELETIONS of jobs leave claims alone. A job is written before it claims its key, so a claim to an unknown
 //! job is left over from a deleted one, and may be replaced.

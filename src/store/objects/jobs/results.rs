@@ -102,7 +102,7 @@ impl Objects {
             return Ok(false);
         }
         if !self.find_job(owner, id).await?.is_some_and(|job| job.is_known()) {
-            // The rest is left to whoever deletes the job, and answers whether it was there.
+            // Whoever deletes the job removes the rest, and learns from its request that the job existed.
             self.delete(&self.job(owner, id, RESULT)).await?;
             return Ok(false);
         }

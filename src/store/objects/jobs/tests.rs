@@ -234,6 +234,17 @@ async fn of_all_who_delete_a_job_at_once_one_does() {
 }
 
 #[tokio::test]
+async fn a_late_result_leaves_the_rest_to_the_deletion_that_is_under_way() {
+    let objects = Objects::in_memory();
+    let id = asked(&objects, b"body").await;
+    objects.put(&objects.job(&owner(), id, DELETED), PutPayload::default()).await.unwrap();
+    assert!(!objects.cancel_job(&owner(), id).await.unwrap());
+    // The deletion goes on, and the job was there.
+    assert!(objects.clear_job(&owner(), id).await.unwrap());
+    assert_eq!(objects.jobs(&owner()).await.unwrap(), []);
+}
+
+#[tokio::test]
 async fn a_key_is_claimed_once_for_each_state_of_its_register() {
     let objects = Objects::in_memory();
     let (key, name) = (KeyHash::of(b"key"), owner());
