@@ -274,7 +274,7 @@ fn probed(unit: f64, offset: f64) -> Value {
 }
 
 #[tokio::test]
-async fn eight_equal_requests_share_a_look_for_landmarks_and_one_that_leaves_spoils_nothing() {
+async fn eight_equal_requests_find_the_same_landmarks_and_one_that_leaves_spoils_nothing() {
     let server = Server::start().await;
     let body = probed(1.0, 0.0);
     let leaving = async {

@@ -102,7 +102,7 @@ impl Objects {
             return Ok(false);
         }
         if !self.find_job(owner, id).await?.is_some_and(|job| job.is_known()) {
-            // Whoever deletes the job removes the rest, and learns from its request that the job existed.
+            // The rest is left to the deletion, which answers whether it removed a request.
             self.delete(&self.job(owner, id, RESULT)).await?;
             return Ok(false);
         }
