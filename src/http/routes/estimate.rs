@@ -4,8 +4,7 @@ use std::sync::Arc;
 
 use axum::Extension;
 use axum::extract::{Request, State};
-use serde::Serialize;
-use serde::de::IgnoredAny;
+use serde::{Deserialize, Serialize};
 use utoipa::openapi::schema::{AdditionalProperties, RefBuilder, Schema, SchemaType, Type};
 use utoipa::openapi::{ObjectBuilder, RefOr};
 use utoipa::{PartialSchema, ToSchema};
@@ -33,7 +32,6 @@ use crate::http::serve::operation::{self, Declared, REQUEST_FORMATS};
 use crate::http::state::app::App;
 use crate::http::wire::read::body::UnpackedBody;
 use crate::http::wire::read::limits::ParseContext;
-use crate::http::wire::read::without::WithOperation;
 use crate::http::wire::write::json::Json;
 use crate::store::Owner;
 
@@ -125,6 +123,10 @@ pub async fn estimate(
     estimate_of(&operation, &app, &admission, intake).await
 }
 
+/// A request of any operation, whose members are skipped.
+#[derive(Deserialize)]
+struct AnyRequest {}
+
 /// Returns the name of the operation, and the body to be read again as a request of that operation.
 fn name_of(
     intake: ReceivedBody,
@@ -132,7 +134,7 @@ fn name_of(
     observer: &JobObserver,
 ) -> Result<(String, ReceivedBody), Problem> {
     let (body, memory) = intake.unpack(app, observer)?;
-    let named: WithOperation<IgnoredAny> = body.parse(&ParseContext::new(&app.config, observer))?;
+    let named = body.parse_with_operation::<AnyRequest>(&ParseContext::new(&app.config, observer))?;
     let missing = || Problem::invalid_request("/operation", "name the operation whose request this is");
     let operation = named.operation.ok_or_else(missing)?;
     Ok((operation, ReceivedBody { body: body.into_request(app.memory.body), memory }))

@@ -25,7 +25,6 @@ use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::http::state::app::App;
 use crate::http::wire::negotiation::{BodyFormat, Format, Wanted};
-use crate::http::wire::read::without::WithOperation;
 use crate::http::wire::write::answer::Answer;
 use crate::http::wire::write::encode::Encoded;
 use crate::store::Owner;
@@ -202,7 +201,7 @@ pub async fn estimate<O: Operation>(
     intake: ReceivedBody,
 ) -> Result<Estimate, Problem> {
     let parsed = |intake: ReceivedBody, app: &App, observer: &JobObserver| {
-        let (named, memory) = intake.parse::<WithOperation<O>>(app, observer)?;
+        let (named, memory) = intake.parse_with_operation::<O>(app, observer)?;
         Ok((named.request, memory))
     };
     let began = Instant::now();

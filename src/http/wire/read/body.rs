@@ -3,9 +3,9 @@
 use serde::de::DeserializeOwned;
 
 use super::limits::ParseContext;
-use super::parse::parse_json;
-use super::ply::parse_ply;
-use super::tensors::{parse_npy, parse_safetensors};
+use super::parse::{Document, WithOperation};
+use super::ply::read_ply;
+use super::tensors::{read_npy, read_safetensors};
 use crate::config::Config;
 use crate::http::compute::FLOPS_PER_PARSED_BYTE;
 use crate::http::problem::Problem;
@@ -101,11 +101,26 @@ impl UnpackedBody {
     /// - 400 for a body that is not of its format.
     /// - 422 with a pointer for a well-formed body that is not a `T`.
     pub fn parse<T: DeserializeOwned>(&self, context: &ParseContext<'_>) -> Result<T, Problem> {
+        self.document()?.parse(context)
+    }
+
+    /// Parses the body and the member `operation` that it may have beside those of the request, on the pool.
+    ///
+    /// # Errors
+    /// Returns the errors of [`UnpackedBody::parse`].
+    pub fn parse_with_operation<T: DeserializeOwned>(
+        &self,
+        context: &ParseContext<'_>,
+    ) -> Result<WithOperation<T>, Problem> {
+        self.document()?.parse_with_operation(context)
+    }
+
+    fn document(&self) -> Result<Document<'_>, Problem> {
         match self.format {
-            BodyFormat::Json => parse_json(&self.bytes, context),
-            BodyFormat::Safetensors => parse_safetensors(&self.bytes, context),
-            BodyFormat::Npy => parse_npy(&self.bytes, context),
-            BodyFormat::Ply => parse_ply(&self.bytes, context),
+            BodyFormat::Json => Ok(Document::json(&self.bytes)),
+            BodyFormat::Safetensors => read_safetensors(&self.bytes),
+            BodyFormat::Npy => read_npy(&self.bytes),
+            BodyFormat::Ply => read_ply(&self.bytes),
         }
     }
 }

@@ -1,65 +1,108 @@
-//! Parsing of bytes into requests, with the same limits, pointers and cancellation for every format.
+//! Parsing of bodies into requests, with the same limits, pointers and cancellation for every format.
+
+use std::borrow::Cow;
 
 use serde::de::{DeserializeOwned, IgnoredAny};
-use serde_json::error::Category;
+use serde_json::Error;
 
-use super::guarded::{Guard, Stop, shortened};
 use super::limits::ParseContext;
-use super::plain_json;
+use super::reader::{MAX_NESTING, Named, Reader, Stop, shortened};
 use crate::http::problem::slug::Slug;
 use crate::http::problem::{Pointers, Problem};
 use gramian_numerics::error::NumericsError;
 
-/// Deepest nesting of lists and objects, the limit of `serde_json`.
-const MAX_NESTING: usize = 128;
+/// A body that is about to be read as a request: a JSON text, and the numbers that are not in it.
+pub struct Document<'a> {
+    text: Cow<'a, [u8]>,
+    /// `None` if numbers are in the text.
+    tables: Option<Vec<Named<'a>>>,
+}
+
+/// A request `T`, and a member `operation` that its body had beside the members of `T`.
+#[derive(Debug)]
+pub struct WithOperation<T> {
+    pub operation: Option<String>,
+    pub request: T,
+}
+
+impl<'a> Document<'a> {
+    /// A body in JSON.
+    pub fn json(text: &'a [u8]) -> Self {
+        Self { text: text.into(), tables: None }
+    }
+
+    /// A body whose numbers are in tables, where those of the same object stand side by side. `text` is the
+    /// JSON of all other members.
+    pub(super) fn with_tables(text: Cow<'a, [u8]>, tables: Vec<Named<'a>>) -> Self {
+        Self { text, tables: Some(tables) }
+    }
+
+    /// Parses the body into a request.
+    ///
+    /// # Errors
+    /// - 413 for a list that is longer than any request may have.
+    /// - 400 `malformed-json` for text that is not JSON, and `malformed-body` for data that end early.
+    /// - 422 `invalid-request` with a pointer for a well-formed body that is not a `T`.
+    pub fn parse<T: DeserializeOwned>(mut self, context: &ParseContext<'_>) -> Result<T, Problem> {
+        let mut reader = self.reader(context);
+        reader.read().map_err(|error| refusal(&error, reader, context))
+    }
+
+    /// Parses the body into a request, and into the member `operation` that may stand beside those of the
+    /// request.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Document::parse`].
+    pub fn parse_with_operation<T: DeserializeOwned>(
+        mut self,
+        context: &ParseContext<'_>,
+    ) -> Result<WithOperation<T>, Problem> {
+        let mut reader = self.reader(context).without_operation();
+        match reader.read() {
+            Ok(request) => Ok(WithOperation { operation: reader.into_operation(), request }),
+            Err(error) => Err(refusal(&error, reader, context)),
+        }
+    }
+
+    fn reader<'r>(&'r mut self, context: &'r ParseContext<'_>) -> Reader<'r> {
+        let reader = Reader::new(&self.text, context);
+        match self.tables.take() {
+            Some(tables) => reader.with_tables(tables),
+            None => reader,
+        }
+    }
+}
 
 /// Parses JSON into a request.
 ///
 /// # Errors
-/// - 413 for a list that is longer than any request may have.
-/// - 400 `malformed-json` for text that is not JSON.
-/// - 422 `invalid-request` with a pointer for JSON that is not a `T`.
+/// Returns the errors of [`Document::parse`].
 pub fn parse_json<T: DeserializeOwned>(bytes: &[u8], context: &ParseContext<'_>) -> Result<T, Problem> {
-    let guard = Guard::new(context);
-    if let Some(request) = plain_json::from_slice(bytes, |json| T::deserialize(guard.around(json))) {
-        return Ok(request);
-    }
-    if let Some(stop) = guard.stop() {
-        return Err(stopped(stop, &guard, context));
-    }
-    let guard = Guard::asking_for_any(context);
-    let mut deserializer = serde_json::Deserializer::from_slice(bytes);
-    let parsed = T::deserialize(guard.around(&mut deserializer))
-        .and_then(|request| deserializer.end().map(|()| request));
-    parsed.map_err(|error| refusal(&error, &guard, context, bytes))
+    Document::json(bytes).parse(context)
 }
 
-/// Returns the problem of a failed parse. `text` is the JSON of the document.
-pub(super) fn refusal(
-    error: &serde_json::Error,
-    guard: &Guard<'_>,
-    context: &ParseContext<'_>,
-    text: &[u8],
-) -> Problem {
-    if let Some(stop) = guard.stop() {
-        return stopped(stop, guard, context);
+/// Returns the problem of a failed parse.
+///
+/// The first error may be one of type although the text is not JSON further on. So it is read again to its
+/// end by `serde_json`, which also words what is wrong with it.
+#[cold]
+fn refusal(error: &Error, reader: Reader<'_>, context: &ParseContext<'_>) -> Problem {
+    let failure = reader.into_failure();
+    match failure.stop {
+        Some(Stop::Cancelled) => return Problem::from_numerics(NumericsError::Cancelled, Pointers::REQUEST),
+        Some(Stop::TooLarge(excess)) => return context.too_large(excess, &failure.pointer),
+        Some(Stop::Malformed(problem)) => return *problem,
+        None => {}
     }
-    match error.classify() {
-        Category::Syntax | Category::Eof | Category::Io => malformed_json(error),
-        Category::Data if nests_too_deep(text) => {
-            let detail = format!("lists and objects are nested more than {MAX_NESTING} deep");
-            Problem::new(Slug::MalformedJson, detail)
+    if nests_too_deep(failure.text) {
+        return malformed_json(format!("lists and objects are nested more than {MAX_NESTING} deep"));
+    }
+    match (serde_json::from_slice::<IgnoredAny>(failure.text), failure.flaw) {
+        (Err(error), _) => malformed_json(error.to_string()),
+        (Ok(IgnoredAny), Some(flaw)) => malformed_json(flaw),
+        (Ok(IgnoredAny), None) => {
+            Problem::invalid_request(failure.pointer, shortened(error.to_string().into()))
         }
-        // The type error came first, but the rest of the text may still be malformed JSON.
-        Category::Data => match serde_json::from_slice::<IgnoredAny>(text) {
-            Err(error) => malformed_json(&error),
-            Ok(IgnoredAny) => {
-                let message = error.to_string();
-                // The pointer says more than the position in bytes.
-                let message = message.rsplit_once(" at line ").map_or(message.as_str(), |(text, _)| text);
-                Problem::invalid_request(guard.pointer(), shortened(message))
-            }
-        },
     }
 }
 
@@ -85,16 +128,9 @@ fn nests_too_deep(text: &[u8]) -> bool {
     false
 }
 
-fn stopped(stop: Stop, guard: &Guard<'_>, context: &ParseContext<'_>) -> Problem {
-    match stop {
-        Stop::Cancelled => Problem::from_numerics(NumericsError::Cancelled, Pointers::REQUEST),
-        Stop::TooLarge(excess) => context.too_large(excess, &guard.pointer()),
-    }
-}
-
 /// 400 for text that is not JSON.
-fn malformed_json(error: &serde_json::Error) -> Problem {
-    Problem::new(Slug::MalformedJson, error.to_string())
+fn malformed_json(detail: String) -> Problem {
+    Problem::new(Slug::MalformedJson, detail)
 }
 
 #[cfg(test)]

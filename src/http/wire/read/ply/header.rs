@@ -18,12 +18,14 @@ pub(super) enum Encoding {
 }
 
 /// A group of `count` records with the same properties.
+#[derive(Clone)]
 pub(super) struct Element<'a> {
     pub(super) name: &'a str,
     pub(super) count: usize,
     pub(super) properties: Vec<Property<'a>>,
 }
 
+#[derive(Clone)]
 pub(super) struct Property<'a> {
     name: &'a str,
     pub(super) kind: Kind,

@@ -12,19 +12,13 @@ mod data;
 mod header;
 mod rows;
 
-use std::cell::Cell;
-
-use serde::de::DeserializeOwned;
-use serde::de::value::MapDeserializer;
-
-use super::guarded::Guard;
-use super::limits::ParseContext;
-use super::parse::refusal;
+use super::parse::Document;
+use super::reader::{Named, Table};
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use data::Cursor;
 use header::{Element, Header};
-use rows::Rows;
+pub(super) use rows::Rows;
 
 /// Longest header in bytes, as in the other formats. Headers of scanners take some hundreds of bytes.
 const MAX_HEADER_BYTES: usize = 64 << 10;
@@ -58,30 +52,25 @@ fn malformed(error: PlyError) -> Problem {
         .with_remedy("write the file again, as PLY 1.0 with the counts that it has")
 }
 
-/// Parses the vertices of a file into the members `points` and `normals`.
+/// Reads the header of a file, whose vertices are the members `points` and `normals`.
 ///
 /// # Errors
-/// - 400 for a body that is not PLY, or that ends before its vertices do.
-/// - 413 for too many vertices.
-/// - 422 with a pointer for vertices without coordinates, and for numbers that are not finite.
-pub fn parse_ply<T: DeserializeOwned>(bytes: &[u8], context: &ParseContext<'_>) -> Result<T, Problem> {
+/// - 400 for a body that is not PLY, or that ends before its vertices begin.
+/// - 422 with a pointer for vertices without coordinates.
+pub fn read_ply(bytes: &[u8]) -> Result<Document<'_>, Problem> {
     let (header, data) = Header::parse(bytes).map_err(malformed)?;
     let (before, vertices) = split_at_vertices(&header)?;
-    let columns = |names: [&str; 3]| vertices.columns(names);
-    let Some(coordinates) = columns(COORDINATES) else { return Err(without_coordinates(vertices)) };
+    let Some(coordinates) = vertices.columns(COORDINATES) else { return Err(without_coordinates(vertices)) };
     let mut cursor = Cursor::new(data, &header);
     before.iter().try_for_each(|element| cursor.skip(element)).map_err(malformed)?;
     cursor.check_room(vertices).map_err(malformed)?;
-    let failure = Cell::new(None);
-    let lists = [("points", Some(coordinates)), ("normals", columns(NORMAL))];
-    let members = lists
-        .into_iter()
-        .filter_map(|(name, columns)| Some((name, Rows::new(cursor, vertices, columns?, &failure))));
-    let guard = Guard::asking_for_any(context);
-    T::deserialize(guard.around(MapDeserializer::new(members))).map_err(|error| match failure.take() {
-        Some(failure) => malformed(failure),
-        None => refusal(&error, &guard, context, b"{}"),
-    })
+    let table = |name: &str, columns| {
+        let rows = Rows::new(cursor, vertices.clone(), columns);
+        Named::new(vec![name.to_owned()], Table::Vertices(rows))
+    };
+    let points = table("points", coordinates);
+    let normals = vertices.columns(NORMAL).map(|columns| table("normals", columns));
+    Ok(Document::with_tables(b"{}".into(), [points].into_iter().chain(normals).collect()))
 }
 
 /// Returns the elements before the vertices, and the vertices.

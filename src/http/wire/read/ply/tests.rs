@@ -3,6 +3,7 @@
 use serde::Deserialize;
 
 use super::*;
+use crate::http::wire::read::limits::ParseContext;
 use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
 
@@ -17,7 +18,7 @@ struct Request {
 const UNLIMITED: ParseContext<'static> = ParseContext::UNLIMITED;
 
 fn parse(body: &[u8]) -> Result<Request, Problem> {
-    parse_ply(body, &UNLIMITED)
+    read_ply(body)?.parse(&UNLIMITED)
 }
 
 fn read(body: &[u8]) -> (Vec<f64>, Option<Vec<f64>>) {
@@ -234,7 +235,7 @@ fn what_is_a_file_but_no_cloud_points_to_its_place() {
 fn more_vertices_than_the_limit_are_not_read() {
     let context = ParseContext { max_points: 1, ..UNLIMITED };
     let body = file("ascii", &VERTICES, b"these are no numbers\n4 5 6\n");
-    let problem = parse_ply::<Request>(&body, &context).unwrap_err();
+    let problem = read_ply(&body).unwrap().parse::<Request>(&context).unwrap_err();
     let document = serde_json::to_value(problem.document("")).unwrap();
     assert_eq!((problem.slug(), &document["required"]), (Slug::ProblemTooLarge, &2.into()));
     assert_eq!(document["errors"][0]["pointer"], "/points");

@@ -2,21 +2,19 @@
 //!
 //! The same types read all formats, so every check and every pointer is the same.
 
-mod merged;
 mod npy;
 mod tensor;
 
-use safetensors::SafeTensors;
-use serde::de::DeserializeOwned;
+use std::borrow::Cow;
 
-use super::guarded::Guard;
-use super::limits::ParseContext;
-use super::parse::refusal;
+use safetensors::SafeTensors;
+
+use super::parse::Document;
+use super::reader::Named;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
-use merged::{Merged, Named};
 use npy::Npy;
-use tensor::Node;
+pub(super) use tensor::Tensor;
 
 /// Most segments of a tensor name, as in `geometry.cloud.points`. The last segment keeps any further dots.
 const MAX_DEPTH: usize = 3;
@@ -28,22 +26,22 @@ const MAX_DEPTH: usize = 3;
 /// so it has a limit of its own. The numbers after the header are read in place.
 const MAX_HEADER_BYTES: usize = 64 << 10;
 
+/// The text of a request that has no members beside its tensors.
+const NOTHING: &[u8] = b"{}";
+
 /// Most tensors of a request, more than any request has names for.
 const MAX_TENSORS: usize = 64;
 
-/// Parses a safetensors body.
+/// Reads the header of a safetensors body.
 ///
 /// Tensors are named like the arrays of the JSON, with a dot for nested objects (`cloud.points`). All other
 /// members are JSON text in the metadata entry `request`.
 ///
 /// # Errors
-/// - 400 for a body that is not safetensors, or metadata that is not JSON.
-/// - 413 for a header or a list beyond the limits.
-/// - 422 with a pointer for a well-formed body that is not a `T`.
-pub fn parse_safetensors<T: DeserializeOwned>(
-    bytes: &[u8],
-    context: &ParseContext<'_>,
-) -> Result<T, Problem> {
+/// - 400 for a body that is not safetensors.
+/// - 413 for a header beyond the limit.
+/// - 422 for too many tensors.
+pub fn read_safetensors(bytes: &[u8]) -> Result<Document<'_>, Problem> {
     let malformed =
         |error| Problem::new(Slug::MalformedBody, format!("the body is not safetensors: {error}"));
     check_header(bytes)?;
@@ -55,12 +53,15 @@ pub fn parse_safetensors<T: DeserializeOwned>(
     }
     let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(malformed)?;
     let text = metadata.metadata().as_ref().and_then(|entries| entries.get("request"));
-    let tensors = tensors.tensors();
+    let text = text.map_or(Cow::Borrowed(NOTHING), |text| text.clone().into_bytes().into());
+    let mut tensors = tensors.tensors();
+    // By name, so that the tensors of an object stand side by side.
+    tensors.sort_by(|(one, _), (other, _)| one.split('.').cmp(other.split('.')));
     let named = tensors.iter().map(|(name, tensor)| {
-        let path = name.splitn(MAX_DEPTH, '.').collect();
-        Named { path, node: Node::of(tensor) }
+        let path = name.splitn(MAX_DEPTH, '.').map(str::to_owned).collect();
+        Named::new(path, Tensor::of_view(tensor))
     });
-    parse_merged(text.map_or("{}", String::as_str), &named.collect::<Vec<_>>(), context)
+    Ok(Document::with_tables(text, named.collect()))
 }
 
 /// Checks the length of the header, stated in the first eight bytes.
@@ -78,29 +79,15 @@ fn check_header(bytes: &[u8]) -> Result<(), Problem> {
     }
 }
 
-/// Parses an npy array into the member `points`.
+/// Reads the header of an npy array, which is the member `points`.
 ///
 /// # Errors
-/// - 400 for a body that is not npy.
-/// - 413 for too many points.
-/// - 422 with a pointer for an array that is not a `T`.
-pub fn parse_npy<T: DeserializeOwned>(bytes: &[u8], context: &ParseContext<'_>) -> Result<T, Problem> {
-    let array = Npy::parse(bytes, MAX_HEADER_BYTES).and_then(Npy::into_node);
-    let node =
+/// 400 for a body that is not npy.
+pub fn read_npy(bytes: &[u8]) -> Result<Document<'_>, Problem> {
+    let array = Npy::parse(bytes, MAX_HEADER_BYTES).and_then(Npy::into_table);
+    let table =
         array.ok_or_else(|| Problem::new(Slug::MalformedBody, "the body is not npy, or ends early"))?;
-    parse_merged("{}", &[Named { path: vec!["points"], node }], context)
-}
-
-fn parse_merged<T: DeserializeOwned>(
-    text: &str,
-    tensors: &[Named<'_>],
-    context: &ParseContext<'_>,
-) -> Result<T, Problem> {
-    let guard = Guard::asking_for_any(context);
-    let mut json = serde_json::Deserializer::from_str(text);
-    let parsed = T::deserialize(guard.around(Merged::new(&mut json, tensors)));
-    let parsed = parsed.and_then(|request| json.end().map(|()| request));
-    parsed.map_err(|error| refusal(&error, &guard, context, text.as_bytes()))
+    Ok(Document::with_tables(NOTHING.into(), vec![Named::new(vec!["points".to_owned()], table)]))
 }
 
 #[cfg(test)]
@@ -110,8 +97,10 @@ mod tests {
     use safetensors::Dtype;
     use safetensors::tensor::TensorView;
     use serde::Deserialize;
+    use serde::de::DeserializeOwned;
 
     use super::*;
+    use crate::http::wire::read::limits::ParseContext;
     use crate::http::wire::read::members::present_unless_empty;
     use crate::http::wire::read::points::Points;
 
@@ -145,8 +134,16 @@ mod tests {
         safetensors::serialize(views, metadata).unwrap()
     }
 
+    fn parse_safetensors<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
+        read_safetensors(body)?.parse(&ParseContext::UNLIMITED)
+    }
+
+    fn parse_npy(body: &[u8]) -> Result<Request, Problem> {
+        read_npy(body)?.parse(&ParseContext::UNLIMITED)
+    }
+
     fn refused(body: &[u8]) -> (Slug, String) {
-        describe(&parse_safetensors::<Request>(body, &ParseContext::UNLIMITED).unwrap_err())
+        describe(&parse_safetensors::<Request>(body).unwrap_err())
     }
 
     fn describe(problem: &Problem) -> (Slug, String) {
@@ -164,19 +161,14 @@ mod tests {
         let noise = ("geometry.noise", Dtype::F64, &[1][..], bytes(&[0.5]));
         let tensors = [points(), ("values", Dtype::F32, &[2], values), noise];
         let body = safetensors(&tensors, Some(r#"{"alpha": 0.25, "geometry": {"alpha": 2}}"#));
-        let request: Request = parse_safetensors(&body, &ParseContext::UNLIMITED).unwrap();
+        let request: Request = parse_safetensors(&body).unwrap();
         assert_eq!(request.points.coordinates, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         assert_eq!((request.points.dimension, request.alpha), (3, Some(0.25)));
         assert_eq!(request.values.unwrap(), [f64::from(0.1f32), f64::from(0.2f32)]);
         let geometry = request.geometry.unwrap();
         assert_eq!((geometry.noise, geometry.alpha), (vec![0.5], Some(2.0)));
         // Without the metadata entry there are only tensors.
-        assert_eq!(
-            parse_safetensors::<Request>(&safetensors(&[points()], None), &ParseContext::UNLIMITED)
-                .unwrap()
-                .alpha,
-            None
-        );
+        assert_eq!(parse_safetensors::<Request>(&safetensors(&[points()], None)).unwrap().alpha, None);
     }
 
     #[test]
@@ -223,9 +215,8 @@ mod tests {
             include: Option<Vec<String>>,
             geometry: Option<Box<WithWords>>,
         }
-        let parse = |tensors: &[Given<'_>], text| {
-            parse_safetensors::<WithWords>(&safetensors(tensors, Some(text)), &ParseContext::UNLIMITED)
-        };
+        let parse =
+            |tensors: &[Given<'_>], text| parse_safetensors::<WithWords>(&safetensors(tensors, Some(text)));
         let text = r#"{"include": ["a", "b"], "normals": [], "geometry": {"noise_variances": []}}"#;
         let request = parse(&[], text).unwrap();
         assert_eq!(request.include.unwrap(), ["a", "b"]);
@@ -286,7 +277,7 @@ mod tests {
             npy("<f4", "False", "(2,3,)", &single),
             npy(">f4", "True", "( 2, 3 )", &big_single),
         ] {
-            let request: Request = parse_npy(&body, &ParseContext::UNLIMITED).unwrap();
+            let request: Request = parse_npy(&body).unwrap();
             assert_eq!((request.points.coordinates.as_slice(), request.points.dimension), (&rows[..], 3));
         }
     }
@@ -294,10 +285,9 @@ mod tests {
     #[test]
     fn npy_that_is_none_is_malformed_and_other_arrays_are_refused() {
         let data = bytes(&[1.0, 2.0]);
-        let refused =
-            |body: &[u8]| describe(&parse_npy::<Request>(body, &ParseContext::UNLIMITED).unwrap_err());
+        let refused = |body: &[u8]| describe(&parse_npy(body).unwrap_err());
         let good = npy("<f8", "False", "(1, 2)", &data);
-        assert!(parse_npy::<Request>(&good, &ParseContext::UNLIMITED).is_ok());
+        assert!(parse_npy(&good).is_ok());
         for broken in [&good[..good.len() - 1], &good[..20], &good[..9], &good[1..], &[]] {
             assert_eq!(refused(broken).0, Slug::MalformedBody);
         }

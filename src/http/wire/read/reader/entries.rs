@@ -1,0 +1,191 @@
+//! Entries of a list: counted to the end, but kept only up to the limit.
+
+use serde::de::{DeserializeSeed, Error as _, SeqAccess};
+use serde_json::Error;
+
+use super::text::Token;
+use super::value::{Source, Value};
+use super::{Reader, Stop};
+use crate::http::wire::read::limits::{Excess, List};
+
+/// Entries that a list is granted at a time. Within a grant, counting an entry is a single decrement.
+const ENTRIES_PER_GRANT: usize = 64;
+
+/// The entries of a list, all counted, of which at most `max_length` are kept.
+pub(super) struct Entries<'r, 'a> {
+    reader: &'r mut Reader<'a>,
+    /// Source of the list.
+    source: Source,
+    list: List,
+    /// Lists and objects around an entry.
+    depth: usize,
+    /// Number of entries, which tables know beforehand.
+    known_length: Option<usize>,
+    max_length: usize,
+    /// Entries that will have been read when the current grant is used up.
+    n_granted: usize,
+    /// Entries left of the current grant.
+    n_left: usize,
+    is_first: bool,
+    is_over: bool,
+}
+
+impl<'r, 'a> Entries<'r, 'a> {
+    /// The entries of a list whose beginning was read.
+    #[inline(always)]
+    pub(super) fn new(list: Value<'r, 'a>) -> Self {
+        let Value { reader, source, list, depth } = list;
+        let known_length = match source {
+            Source::Table(at) => Some(reader.tables[at].table.length()),
+            Source::Row(at, _) => reader.tables[at].table.width(),
+            Source::Text(_) | Source::Tables(_) | Source::Number(_) => None,
+        };
+        let max_length = reader.context.max_entries(list);
+        // A row gets its first grant when it is created. A row of a table may be too long from the start.
+        let is_granted = list == List::Coordinates && known_length.is_none_or(|length| length <= max_length);
+        let n_granted = if is_granted { max_length.min(ENTRIES_PER_GRANT) } else { 0 };
+        let (n_left, depth) = (n_granted, depth + 1);
+        let (is_first, is_over) = (true, false);
+        Self { reader, source, list, depth, known_length, max_length, n_granted, n_left, is_first, is_over }
+    }
+
+    /// Checks that no entry is left, since types of a fixed length read no more than that.
+    pub(super) fn end(&mut self) -> Result<(), Error> {
+        let has_more = !self.is_over && self.goes_on()?;
+        if has_more { Err(Error::custom("the list is longer than expected")) } else { Ok(()) }
+    }
+
+    /// Number of entries read so far.
+    fn length(&self) -> usize {
+        self.n_granted - self.n_left
+    }
+
+    /// Whether another entry follows.
+    #[inline(always)]
+    fn goes_on(&mut self) -> Result<bool, Error> {
+        let goes_on = match self.known_length {
+            Some(length) => self.length() < length,
+            None => self.reader.text.goes_on(b']', &mut self.is_first)?,
+        };
+        self.is_over = !goes_on;
+        Ok(goes_on)
+    }
+
+    /// The value of the next entry, if there is one.
+    #[inline(always)]
+    fn next(&mut self) -> Result<Option<Value<'_, 'a>>, Error> {
+        if !self.goes_on()? {
+            return Ok(None);
+        }
+        let (at, list) = (self.length(), self.list.of_entries());
+        let source = match self.source {
+            Source::Table(table) if self.reader.tables[table].table.width().is_some() => {
+                Source::Row(table, at)
+            }
+            Source::Table(table) => Source::Number(self.reader.number(table, at, 0)?),
+            Source::Row(table, row) => Source::Number(self.reader.number(table, row, at)?),
+            Source::Text(_) | Source::Tables(_) | Source::Number(_) => Source::Text(0..0),
+        };
+        Ok(Some(Value { reader: &mut *self.reader, source, list, depth: self.depth }))
+    }
+
+    fn is_granted_more(&mut self) -> Result<bool, Error> {
+        self.reader.tick()?;
+        let n_free = self.max_length - self.n_granted;
+        if self.known_length.is_some_and(|length| length > self.max_length) {
+            return Ok(false);
+        }
+        self.n_left = n_free.min(ENTRIES_PER_GRANT);
+        self.n_granted += self.n_left;
+        Ok(self.n_left > 0)
+    }
+
+    /// Counts the remaining entries without keeping them.
+    ///
+    /// `width` is the length of the entry just read, if that was a row with too many coordinates. The error
+    /// then reports the number of rows as well.
+    #[cold]
+    fn count(&mut self, width: Option<usize>) -> Result<(), Error> {
+        let length = match self.known_length {
+            Some(length) => length,
+            None => self.count_text()?,
+        };
+        self.is_over = true;
+        if length <= self.max_length && width.is_none() {
+            return Ok(());
+        }
+        // A row that is too long ends here. Its list goes on, so that all points are counted.
+        if self.list == List::Coordinates {
+            self.reader.too_wide = Some(length);
+            return Ok(());
+        }
+        Err(self.reader.stopped(Stop::TooLarge(Excess { list: self.list, length, width })))
+    }
+
+    fn count_text(&mut self) -> Result<usize, Error> {
+        let mut length = self.length();
+        loop {
+            if length.is_multiple_of(ENTRIES_PER_GRANT) {
+                self.reader.tick()?;
+            }
+            match self.pass() {
+                Ok(true) => length += 1,
+                Ok(false) => return Ok(length),
+                Err(error) => return Err(self.reader.passed(length, error)),
+            }
+        }
+    }
+
+    /// Skips an entry: a number or a row of numbers. Returns whether there was one.
+    fn pass(&mut self) -> Result<bool, Error> {
+        let Some(entry) = self.next()? else { return Ok(false) };
+        let mut entry = Value { list: List::Other, ..entry };
+        match entry.token()? {
+            Token::Unsigned(_) | Token::Signed(_) | Token::Float(_) => {}
+            Token::List => {
+                let mut row = Entries::new(entry);
+                while row.next_element::<f64>()?.is_some() {}
+            }
+            other => return Err(other.refused(&"a number or a list of numbers")),
+        }
+        Ok(true)
+    }
+}
+
+impl<'a> SeqAccess<'a> for Entries<'_, 'a> {
+    type Error = Error;
+
+    #[inline(always)]
+    fn next_element_seed<S: DeserializeSeed<'a>>(&mut self, seed: S) -> Result<Option<S::Value>, Error> {
+        if self.n_left == 0 && !self.is_granted_more()? {
+            return self.count(None).map(|()| None);
+        }
+        let entry = match self.next() {
+            Ok(Some(value)) => seed.deserialize(value),
+            Ok(None) => return Ok(None),
+            Err(error) => Err(error),
+        };
+        match entry {
+            Ok(entry) => {
+                self.n_left -= 1;
+                if self.list.of_entries() == List::Coordinates
+                    && let Some(width) = self.reader.too_wide.take()
+                {
+                    return self.count(Some(width)).map(|()| None);
+                }
+                Ok(Some(entry))
+            }
+            Err(error) => Err(self.reader.passed(self.length(), error)),
+        }
+    }
+
+    /// Capped at the limit: callers reserve memory for this many entries.
+    fn size_hint(&self) -> Option<usize> {
+        let expected = match self.known_length {
+            Some(length) => Some(length - self.length()),
+            None if self.is_first => self.reader.text.expected_entries(),
+            None => None,
+        };
+        expected.map(|length| length.min(self.max_length))
+    }
+}
