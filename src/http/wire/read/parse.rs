@@ -6,7 +6,7 @@ use serde::de::{DeserializeOwned, IgnoredAny};
 use serde_json::Error;
 
 use super::limits::ParseContext;
-use super::reader::{MAX_NESTING, Named, Reader, Stop, shortened};
+use super::reader::{MAX_NESTING, Named, Reader, Stop, read, shortened};
 use crate::http::problem::slug::Slug;
 use crate::http::problem::{Pointers, Problem};
 use gramian_numerics::error::NumericsError;
@@ -45,7 +45,7 @@ impl<'a> Document<'a> {
     /// - 422 `invalid-request` with a pointer for a well-formed body that is not a `T`.
     pub fn parse<T: DeserializeOwned>(mut self, context: &ParseContext<'_>) -> Result<T, Problem> {
         let mut reader = self.reader(context);
-        reader.read().map_err(|error| refusal(&error, reader, context))
+        read(&mut reader).map_err(|error| refusal(&error, reader, context))
     }
 
     /// Parses the body into a request, and into the member `operation` that may stand beside those of the
@@ -58,7 +58,7 @@ impl<'a> Document<'a> {
         context: &ParseContext<'_>,
     ) -> Result<WithOperation<T>, Problem> {
         let mut reader = self.reader(context).without_operation();
-        match reader.read() {
+        match read(&mut reader) {
             Ok(request) => Ok(WithOperation { operation: reader.into_operation(), request }),
             Err(error) => Err(refusal(&error, reader, context)),
         }

@@ -13,12 +13,12 @@ mod header;
 mod rows;
 
 use super::parse::Document;
-use super::reader::{Named, Table};
+use super::reader::Named;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use data::Cursor;
 use header::{Element, Header};
-pub(super) use rows::Rows;
+use rows::Rows;
 
 /// Longest header in bytes, as in the other formats. Headers of scanners take some hundreds of bytes.
 const MAX_HEADER_BYTES: usize = 64 << 10;
@@ -66,7 +66,7 @@ pub fn read_ply(bytes: &[u8]) -> Result<Document<'_>, Problem> {
     cursor.check_room(vertices).map_err(malformed)?;
     let table = |name: &str, columns| {
         let rows = Rows::new(cursor, vertices.clone(), columns);
-        Named::new(vec![name.to_owned()], Table::Vertices(rows))
+        Named::new(vec![name.to_owned()], Ok(Box::new(rows)))
     };
     let points = table("points", coordinates);
     let normals = vertices.columns(NORMAL).map(|columns| table("normals", columns));

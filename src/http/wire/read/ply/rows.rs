@@ -2,52 +2,44 @@
 
 use super::data::Cursor;
 use super::header::Element;
-use super::{PlyError, malformed};
+use super::malformed;
 use crate::http::problem::Problem;
+use crate::http::wire::read::reader::Table;
+
+/// Numbers per row.
+const WIDTH: usize = 3;
 
 /// A list of rows in the data of a file.
-pub struct Rows<'a> {
+pub(super) struct Rows<'a> {
     cursor: Cursor<'a>,
     vertices: Element<'a>,
-    columns: [usize; Rows::WIDTH],
-    /// Index of the next vertex.
-    next: usize,
-    /// Numbers of the vertex before it.
-    row: [f64; Rows::WIDTH],
+    columns: [usize; WIDTH],
 }
 
 impl<'a> Rows<'a> {
-    /// Numbers per row.
-    pub const WIDTH: usize = 3;
-
-    pub(super) fn new(cursor: Cursor<'a>, vertices: Element<'a>, columns: [usize; Rows::WIDTH]) -> Self {
-        Self { cursor, vertices, columns, next: 0, row: [0.0; Rows::WIDTH] }
+    pub(super) fn new(cursor: Cursor<'a>, vertices: Element<'a>, columns: [usize; WIDTH]) -> Self {
+        Self { cursor, vertices, columns }
     }
+}
 
-    pub fn length(&self) -> usize {
+impl Table for Rows<'_> {
+    fn length(&self) -> usize {
         self.vertices.count
     }
 
-    /// Returns a number of a row that is the current one or follows it.
-    ///
-    /// # Errors
-    /// 400 if the file ends before the row or has something else there.
-    pub fn number(&mut self, row: usize, column: usize) -> Result<f64, Box<Problem>> {
-        while self.next <= row {
-            self.read_row().map_err(|error| Box::new(malformed(error)))?;
-        }
-        Ok(self.row[column])
+    fn width(&self) -> Option<usize> {
+        Some(WIDTH)
     }
 
-    fn read_row(&mut self) -> Result<(), PlyError> {
-        let Self { cursor, vertices, columns, next, row } = self;
+    /// Reads one row, so that what is wrong with its numbers is found before what is wrong with the next row.
+    fn read(&mut self, index: usize, numbers: &mut [f64]) -> Result<usize, Box<Problem>> {
+        let Self { cursor, vertices, columns } = self;
         let take = |place, x| {
             if let Some(axis) = columns.iter().position(|&column| column == place) {
-                row[axis] = x;
+                numbers[axis] = x;
             }
         };
-        cursor.record(vertices, *next, take, |place| columns.contains(&place))?;
-        *next += 1;
-        Ok(())
+        let read = cursor.record(vertices, index / WIDTH, take, |place| columns.contains(&place));
+        read.map(|()| WIDTH).map_err(|error| Box::new(malformed(error)))
     }
 }

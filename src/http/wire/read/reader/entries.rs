@@ -3,9 +3,10 @@
 use serde::de::{DeserializeSeed, Error as _, SeqAccess};
 use serde_json::Error;
 
+use super::state::{Reader, Stop};
+use super::table::Cells;
 use super::text::Token;
-use super::value::{Source, Value};
-use super::{Reader, Stop};
+use super::{Source, Value};
 use crate::http::wire::read::limits::{Excess, List};
 
 /// Entries that a list is granted at a time. Within a grant, counting an entry is a single decrement.
@@ -14,13 +15,11 @@ const ENTRIES_PER_GRANT: usize = 64;
 /// The entries of a list, all counted, of which at most `max_length` are kept.
 pub(super) struct Entries<'r, 'a> {
     reader: &'r mut Reader<'a>,
-    /// Source of the list.
-    source: Source,
+    /// The list in a table, if it is not in the text. Its length is known beforehand.
+    cells: Option<Cells>,
     list: List,
     /// Lists and objects around an entry.
     depth: usize,
-    /// Number of entries, which tables know beforehand.
-    known_length: Option<usize>,
     max_length: usize,
     /// Entries that will have been read when the current grant is used up.
     n_granted: usize,
@@ -35,18 +34,16 @@ impl<'r, 'a> Entries<'r, 'a> {
     #[inline(always)]
     pub(super) fn new(list: Value<'r, 'a>) -> Self {
         let Value { reader, source, list, depth } = list;
-        let known_length = match source {
-            Source::Table(at) => Some(reader.tables[at].table.length()),
-            Source::Row(at, _) => reader.tables[at].table.width(),
+        let cells = match source {
+            Source::Cells(cells) => Some(cells),
             Source::Text(_) | Source::Tables(_) | Source::Number(_) => None,
         };
         let max_length = reader.context.max_entries(list);
         // A row gets its first grant when it is created. A row of a table may be too long from the start.
-        let is_granted = list == List::Coordinates && known_length.is_none_or(|length| length <= max_length);
-        let n_granted = if is_granted { max_length.min(ENTRIES_PER_GRANT) } else { 0 };
+        let fits = cells.is_none_or(|cells| cells.length <= max_length);
+        let n_granted = if list == List::Coordinates && fits { max_length.min(ENTRIES_PER_GRANT) } else { 0 };
         let (n_left, depth) = (n_granted, depth + 1);
-        let (is_first, is_over) = (true, false);
-        Self { reader, source, list, depth, known_length, max_length, n_granted, n_left, is_first, is_over }
+        Self { reader, cells, list, depth, max_length, n_granted, n_left, is_first: true, is_over: false }
     }
 
     /// Checks that no entry is left, since types of a fixed length read no more than that.
@@ -63,8 +60,8 @@ impl<'r, 'a> Entries<'r, 'a> {
     /// Whether another entry follows.
     #[inline(always)]
     fn goes_on(&mut self) -> Result<bool, Error> {
-        let goes_on = match self.known_length {
-            Some(length) => self.length() < length,
+        let goes_on = match self.cells {
+            Some(cells) => self.length() < cells.length,
             None => self.reader.text.goes_on(b']', &mut self.is_first)?,
         };
         self.is_over = !goes_on;
@@ -78,13 +75,12 @@ impl<'r, 'a> Entries<'r, 'a> {
             return Ok(None);
         }
         let (at, list) = (self.length(), self.list.of_entries());
-        let source = match self.source {
-            Source::Table(table) if self.reader.tables[table].table.width().is_some() => {
-                Source::Row(table, at)
-            }
-            Source::Table(table) => Source::Number(self.reader.number(table, at, 0)?),
-            Source::Row(table, row) => Source::Number(self.reader.number(table, row, at)?),
-            Source::Text(_) | Source::Tables(_) | Source::Number(_) => Source::Text(0..0),
+        let source = match self.cells {
+            None => Source::Text(0..0),
+            Some(cells) => match cells.row(at) {
+                Some(row) => Source::Cells(row),
+                None => Source::Number(self.reader.number(cells.table, cells.start + at)?),
+            },
         };
         Ok(Some(Value { reader: &mut *self.reader, source, list, depth: self.depth }))
     }
@@ -92,7 +88,7 @@ impl<'r, 'a> Entries<'r, 'a> {
     fn is_granted_more(&mut self) -> Result<bool, Error> {
         self.reader.tick()?;
         let n_free = self.max_length - self.n_granted;
-        if self.known_length.is_some_and(|length| length > self.max_length) {
+        if self.cells.is_some_and(|cells| cells.length > self.max_length) {
             return Ok(false);
         }
         self.n_left = n_free.min(ENTRIES_PER_GRANT);
@@ -106,8 +102,8 @@ impl<'r, 'a> Entries<'r, 'a> {
     /// then reports the number of rows as well.
     #[cold]
     fn count(&mut self, width: Option<usize>) -> Result<(), Error> {
-        let length = match self.known_length {
-            Some(length) => length,
+        let length = match self.cells {
+            Some(cells) => cells.length,
             None => self.count_text()?,
         };
         self.is_over = true;
@@ -181,8 +177,8 @@ impl<'a> SeqAccess<'a> for Entries<'_, 'a> {
 
     /// Capped at the limit: callers reserve memory for this many entries.
     fn size_hint(&self) -> Option<usize> {
-        let expected = match self.known_length {
-            Some(length) => Some(length - self.length()),
+        let expected = match self.cells {
+            Some(cells) => Some(cells.length - self.length()),
             None if self.is_first => self.reader.text.expected_entries(),
             None => None,
         };

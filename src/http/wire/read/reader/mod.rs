@@ -24,162 +24,205 @@
 
 mod entries;
 mod object;
+mod state;
 mod table;
 mod text;
-mod value;
 
 use std::borrow::Cow;
+use std::ops::Range;
 
-use serde::de::{DeserializeOwned, Error as _};
+use serde::de::{DeserializeOwned, Deserializer, Error as _, IntoDeserializer, Visitor};
+use serde::forward_to_deserialize_any;
 use serde_json::Error;
 
-use super::limits::{Excess, List, ParseContext};
-use crate::http::problem::Problem;
-pub(super) use table::{Named, Table};
-use text::Text;
-use value::{Source, Value};
-
-/// Grants between two cancellation checks: some 100 µs of points.
-const GRANTS_PER_CHECK: u32 = 16;
+use super::limits::List;
+use entries::Entries;
+use object::{GIVEN_TWICE, Members};
+pub use state::{Reader, Stop};
+use table::Cells;
+pub use table::{Given, Named, Table};
+use text::Token;
 
 /// Longest text, in characters, that types see and that errors repeat to clients. No valid text is as long.
 const MAX_SHOWN_CHARACTERS: usize = 200;
 
 /// Deepest nesting of lists and objects, the limit of `serde_json`.
-pub(super) const MAX_NESTING: usize = 128;
+pub const MAX_NESTING: usize = 128;
 
-/// Reason for stopping a parse. It takes precedence over any other error of the request.
-pub(super) enum Stop {
-    Cancelled,
-    TooLarge(Excess),
-    /// The data of a table cannot be read.
-    Malformed(Box<Problem>),
+const BELONGS_IN_A_TENSOR: &str = "numbers belong in tensors: send this list as one, named by its path such as cloud.points, \
+                                   and not in the metadata entry request";
+
+/// Reads a whole document.
+///
+/// # Errors
+/// Returns the error of the type, or that of a text which is not JSON. [`Reader::into_failure`] says more
+/// about it.
+pub fn read<T: DeserializeOwned>(reader: &mut Reader<'_>) -> Result<T, Error> {
+    let source = Source::Text(0..reader.tables.len());
+    let request = T::deserialize(Value { reader, source, list: List::Other, depth: 0 })?;
+    reader.text.end().map(|()| request)
 }
 
-/// The place of a member that no request has: [`super::parse::WithOperation`].
-enum Operation {
-    /// The member is like any other.
-    Shown,
-    /// The member is kept from the request.
-    Taken(Option<String>),
+/// A value that is about to be read.
+struct Value<'r, 'a> {
+    reader: &'r mut Reader<'a>,
+    source: Source,
+    /// Kind of list that the value is, if it is a list.
+    list: List,
+    /// Lists and objects around the value.
+    depth: usize,
 }
 
-/// State of one parse.
-pub(super) struct Reader<'a> {
-    context: &'a ParseContext<'a>,
-    text: Text<'a>,
-    /// Those of an object stand side by side.
-    tables: Vec<Named<'a>>,
-    /// Whether lists of numbers are tables, and in the text only when they are empty.
-    are_numbers_in_tables: bool,
-    operation: Operation,
-    grants_until_check: u32,
-    /// Length of the row that was just read, if it has too many entries.
-    too_wide: Option<usize>,
-    stop: Option<Stop>,
-    /// Path of the error, innermost segment first.
-    path: Vec<String>,
+/// Where a value comes from.
+enum Source {
+    /// The next value of the text, and the tables that belong into it if it is an object.
+    Text(Range<usize>),
+    /// An object that is not in the text and consists of tables.
+    Tables(Range<usize>),
+    /// A list in a table.
+    Cells(Cells),
+    /// A number of a table.
+    Number(f64),
 }
 
-impl<'a> Reader<'a> {
-    /// A reader of a JSON document.
-    pub(super) fn new(text: &'a [u8], context: &'a ParseContext<'a>) -> Self {
-        Self {
-            context,
-            text: Text::new(text),
-            tables: Vec::new(),
-            are_numbers_in_tables: false,
-            operation: Operation::Shown,
-            grants_until_check: 0,
-            too_wide: None,
-            stop: None,
-            path: Vec::new(),
+impl<'r, 'a> Value<'r, 'a> {
+    /// Reads the value, or the beginning of a list or an object.
+    fn token(&mut self) -> Result<Token<'a>, Error> {
+        match &self.source {
+            Source::Text(tables) => {
+                let is_alone = tables.is_empty();
+                self.token_of_text(is_alone)
+            }
+            Source::Tables(_) => Ok(Token::Object),
+            Source::Cells(_) => Ok(Token::List),
+            Source::Number(x) => Ok(Token::Float(*x)),
         }
     }
 
-    /// Adds the numbers of the request, which the text must not have then. Tables of the same object stand side
-    /// by side.
-    pub(super) fn with_tables(self, tables: Vec<Named<'a>>) -> Self {
-        Self { tables, are_numbers_in_tables: true, ..self }
-    }
-
-    /// Keeps the member `operation` from the request.
-    pub(super) fn without_operation(self) -> Self {
-        Self { operation: Operation::Taken(None), ..self }
-    }
-
-    /// Reads the whole document.
-    ///
-    /// # Errors
-    /// Returns the error of the type, or that of a text which is not JSON. [`Reader::into_failure`] says more
-    /// about it.
-    pub(super) fn read<T: DeserializeOwned>(&mut self) -> Result<T, Error> {
-        let source = Source::Text(0..self.tables.len());
-        let request = T::deserialize(Value { reader: self, source, list: List::Other, depth: 0 })?;
-        self.text.end().map(|()| request)
-    }
-
-    /// The member `operation` that was kept from the request, if there was one.
-    pub(super) fn into_operation(self) -> Option<String> {
-        match self.operation {
-            Operation::Shown => None,
-            Operation::Taken(operation) => operation,
+    fn token_of_text(&mut self, is_alone: bool) -> Result<Token<'a>, Error> {
+        let Self { reader, list, depth, .. } = self;
+        let token = reader.text.token()?;
+        if matches!(token, Token::Object | Token::List) && *depth == MAX_NESTING {
+            return Err(reader.text.fail("recursion limit exceeded"));
         }
-    }
-
-    /// What is known about the error after which the parse ended.
-    pub(super) fn into_failure(self) -> Failure<'a> {
-        let segments = self.path.iter().rev().map(|segment| segment.replace('~', "~0").replace('/', "~1"));
-        let pointer = segments.flat_map(|segment| ["/".to_owned(), segment]).collect();
-        Failure { stop: self.stop, pointer, flaw: self.text.flaw(), text: self.text.whole() }
-    }
-
-    /// Checks for cancellation now and then. Called before every grant of a list.
-    fn tick(&mut self) -> Result<(), Error> {
-        if self.grants_until_check > 0 {
-            self.grants_until_check -= 1;
-            return Ok(());
+        match token {
+            Token::Object => return Ok(token),
+            Token::List if reader.are_numbers_in_tables && *list != List::Other => {
+                if reader.text.peek() != Some(b']') {
+                    return Err(Error::custom(BELONGS_IN_A_TENSOR));
+                }
+            }
+            _ => {}
         }
-        self.grants_until_check = GRANTS_PER_CHECK;
-        if self.context.observer.is_cancelled() { Err(self.stopped(Stop::Cancelled)) } else { Ok(()) }
-    }
-
-    #[cold]
-    fn stopped(&mut self, stop: Stop) -> Error {
-        self.stop = Some(stop);
-        Error::custom("stopped")
-    }
-
-    #[cold]
-    fn passed(&mut self, segment: impl ToString, error: Error) -> Error {
-        self.path.push(segment.to_string());
-        error
-    }
-
-    /// Reads a number of a table.
-    #[inline]
-    fn number(&mut self, table: usize, row: usize, column: usize) -> Result<f64, Error> {
-        match self.tables[table].table.number(row, column) {
-            Ok(x) if x.is_finite() => Ok(x),
-            Ok(x) => Err(Error::custom(format!("{x} is not finite"))),
-            Err(problem) => Err(self.stopped(Stop::Malformed(problem))),
+        // Tables belong into objects only.
+        if !is_alone {
+            return Err(Error::custom(GIVEN_TWICE));
         }
+        Ok(match token {
+            Token::String(string) => Token::String(shortened(string)),
+            token => token,
+        })
+    }
+
+    /// Shows the list whose beginning was read to a visitor.
+    #[inline(always)]
+    fn visit_list<V: Visitor<'a>>(self, visitor: V) -> Result<V::Value, Error> {
+        let mut entries = Entries::new(self);
+        let list = visitor.visit_seq(&mut entries)?;
+        entries.end().map(|()| list)
     }
 }
 
-/// Why a parse failed, apart from the error itself.
-pub(super) struct Failure<'a> {
-    pub(super) stop: Option<Stop>,
-    /// JSON Pointer to the error (RFC 6901): a slash before each segment, `~` written as `~0` and `/` as
-    /// `~1`.
-    pub(super) pointer: String,
-    /// Why the text is not JSON, if the reader came upon it.
-    pub(super) flaw: Option<String>,
-    pub(super) text: &'a [u8],
+impl<'de> Deserializer<'de> for Value<'_, 'de> {
+    type Error = Error;
+
+    fn deserialize_any<V: Visitor<'de>>(mut self, visitor: V) -> Result<V::Value, Error> {
+        match self.token()? {
+            Token::Object => visitor.visit_map(Members::new(self)),
+            Token::List => self.visit_list(visitor),
+            Token::String(string) => visitor.visit_str(&string),
+            Token::Bool(x) => visitor.visit_bool(x),
+            Token::Null => visitor.visit_unit(),
+            Token::Unsigned(x) => visitor.visit_u64(x),
+            Token::Signed(x) => visitor.visit_i64(x),
+            Token::Float(x) => visitor.visit_f64(x),
+        }
+    }
+
+    #[inline(always)]
+    fn deserialize_f64<V: Visitor<'de>>(mut self, visitor: V) -> Result<V::Value, Error> {
+        match &self.source {
+            Source::Number(x) => visitor.visit_f64(*x),
+            Source::Text(tables) if tables.is_empty() && self.reader.text.is_number() => {
+                visitor.visit_f64(self.reader.text.number()?)
+            }
+            _ => Err(self.token()?.refused(&visitor)),
+        }
+    }
+
+    #[inline(always)]
+    fn deserialize_seq<V: Visitor<'de>>(mut self, visitor: V) -> Result<V::Value, Error> {
+        match self.token()? {
+            Token::List => self.visit_list(visitor),
+            other => Err(other.refused(&visitor)),
+        }
+    }
+
+    /// Recognizes lists that are known by their type instead of their name.
+    fn deserialize_newtype_struct<V: Visitor<'de>>(
+        self,
+        name: &'static str,
+        visitor: V,
+    ) -> Result<V::Value, Error> {
+        let list = List::of_type(name).unwrap_or(self.list);
+        visitor.visit_newtype_struct(Value { list, ..self })
+    }
+
+    /// A member that is there has a value: null is refused by the type that the option holds.
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+        visitor.visit_some(self)
+    }
+
+    fn deserialize_struct<V: Visitor<'de>>(
+        mut self,
+        _name: &'static str,
+        _fields: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Error> {
+        match self.token()? {
+            Token::Object => visitor.visit_map(Members::new(self)),
+            other => Err(other.refused(&"an object")),
+        }
+    }
+
+    fn deserialize_enum<V: Visitor<'de>>(
+        mut self,
+        _name: &'static str,
+        _variants: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Error> {
+        match self.token()? {
+            Token::String(word) => visitor.visit_enum((&*word).into_deserializer()),
+            other => Err(other.refused(&"a string")),
+        }
+    }
+
+    /// Skips a value without limits, because nothing of it is kept.
+    fn deserialize_ignored_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+        if let Source::Text(_) = self.source {
+            self.reader.text.skip()?;
+        }
+        visitor.visit_unit()
+    }
+
+    forward_to_deserialize_any! {
+        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 char str string bytes byte_buf unit unit_struct
+        tuple tuple_struct map identifier
+    }
 }
 
 /// Cuts a text after 200 characters: clients may send megabytes where a name or number belongs.
-pub(super) fn shortened(text: Cow<'_, str>) -> Cow<'_, str> {
+pub fn shortened(text: Cow<'_, str>) -> Cow<'_, str> {
     match text.char_indices().nth(MAX_SHOWN_CHARACTERS) {
         None => text,
         Some((end, _)) => Cow::Owned(format!("{}…", &text[..end])),

@@ -9,9 +9,9 @@ use serde::de::value::StrDeserializer;
 use serde::de::{DeserializeSeed, Error as _, MapAccess};
 use serde_json::Error;
 
-use super::table::Named;
-use super::value::{Source, Value};
-use super::{Operation, Reader, shortened};
+use super::state::{Operation, Reader};
+use super::table::{Cells, Named};
+use super::{Source, Value, shortened};
 use crate::http::wire::read::limits::List;
 
 /// Name of the member that a request can have beside its own.
@@ -42,7 +42,7 @@ impl<'r, 'a> Members<'r, 'a> {
         let (is_in_text, tables) = match source {
             Source::Text(tables) => (true, tables),
             Source::Tables(tables) => (false, tables),
-            Source::Table(_) | Source::Row(..) | Source::Number(_) => (false, 0..0),
+            Source::Cells(_) | Source::Number(_) => (false, 0..0),
         };
         Self { reader, is_in_text, is_first: true, tables, depth, name: Cow::Borrowed(""), of_name: 0..0 }
     }
@@ -81,14 +81,25 @@ impl<'r, 'a> Members<'r, 'a> {
     }
 
     /// Where the value of the current member comes from.
-    fn source(&self) -> Result<Source, Error> {
+    fn source(&mut self) -> Result<Source, Error> {
         let tables = self.of_name.clone();
         let is_table = |at: usize| self.reader.tables[at].path.len() == self.depth + 1;
         match (self.is_in_text, tables.clone().any(is_table)) {
-            (false, true) if tables.len() == 1 => Ok(Source::Table(tables.start)),
+            (false, true) if tables.len() == 1 => self.table(tables.start),
             (_, true) => Err(Error::custom(GIVEN_TWICE)),
             (true, false) => Ok(Source::Text(tables)),
             (false, false) => Ok(Source::Tables(tables)),
+        }
+    }
+
+    fn table(&mut self, table: usize) -> Result<Source, Error> {
+        self.reader.open();
+        match &self.reader.tables[table].table {
+            Ok(cells) => {
+                let (length, width) = (cells.length(), cells.width());
+                Ok(Source::Cells(Cells { table, start: 0, length, width }))
+            }
+            Err(reason) => Err(Error::custom(reason)),
         }
     }
 }

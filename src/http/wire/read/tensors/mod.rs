@@ -14,7 +14,7 @@ use super::reader::Named;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use npy::Npy;
-pub(super) use tensor::Tensor;
+use tensor::Tensor;
 
 /// Most segments of a tensor name, as in `geometry.cloud.points`. The last segment keeps any further dots.
 const MAX_DEPTH: usize = 3;

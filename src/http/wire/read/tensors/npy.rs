@@ -4,7 +4,7 @@
 //! unchecked.
 
 use super::tensor::{Layout, Tensor};
-use crate::http::wire::read::reader::Table;
+use crate::http::wire::read::reader::Given;
 
 /// Highest rank of an array, the limit of `NumPy` itself.
 const MAX_RANK: usize = 64;
@@ -51,19 +51,19 @@ impl<'a> Npy<'a> {
     }
 
     /// Returns `None` if the number of bytes differs from what the header says.
-    pub(super) fn into_table(self) -> Option<Table<'a>> {
+    pub(super) fn into_table(self) -> Option<Given<'a>> {
         let (width, is_big_endian) = match self.descr {
             "<f8" => (8, false),
             ">f8" => (8, true),
             "<f4" => (4, false),
             ">f4" => (4, true),
             other => {
-                return Some(Table::Refused(format!("the array has dtype {other:?}, not '<f8' or '<f4'")));
+                return Some(Err(format!("the array has dtype {other:?}, not '<f8' or '<f4'")));
             }
         };
         let n_bytes = self.shape.iter().try_fold(width, |n: usize, &length| n.checked_mul(length))?;
         let is_transposed = self.fortran_order && self.shape.len() > 1;
         (n_bytes == self.data.len())
-            .then(|| Tensor::table(self.data, &self.shape, Layout { width, is_big_endian, is_transposed }))
+            .then(|| Tensor::of(self.data, &self.shape, Layout { width, is_big_endian, is_transposed }))
     }
 }
