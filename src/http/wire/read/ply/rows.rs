@@ -2,7 +2,7 @@
 
 use super::data::Cursor;
 use super::header::Element;
-use super::malformed;
+use super::{PlyError, malformed};
 use crate::http::problem::Problem;
 use crate::http::wire::read::reader::Table;
 
@@ -20,6 +20,16 @@ impl<'a> Rows<'a> {
     pub(super) fn new(cursor: Cursor<'a>, vertices: Element<'a>, columns: [usize; WIDTH]) -> Self {
         Self { cursor, vertices, columns }
     }
+
+    fn row(&mut self, index: usize, row: &mut [f64]) -> Result<(), PlyError> {
+        let Self { cursor, vertices, columns } = self;
+        let take = |place, x| {
+            if let Some(axis) = columns.iter().position(|&column| column == place) {
+                row[axis] = x;
+            }
+        };
+        cursor.record(vertices, index, take, |place| columns.contains(&place))
+    }
 }
 
 impl Table for Rows<'_> {
@@ -31,15 +41,21 @@ impl Table for Rows<'_> {
         Some(WIDTH)
     }
 
-    /// Reads one row, so that what is wrong with its numbers is found before what is wrong with the next row.
+    /// Reads whole rows up to the first that is malformed. That row is refused once it is the next one to be
+    /// read, so that numbers before it are refused first.
     fn read(&mut self, index: usize, numbers: &mut [f64]) -> Result<usize, Box<Problem>> {
-        let Self { cursor, vertices, columns } = self;
-        let take = |place, x| {
-            if let Some(axis) = columns.iter().position(|&column| column == place) {
-                numbers[axis] = x;
+        let (mut n_read, indices) = (0, index / WIDTH..self.vertices.count);
+        for (row, index) in numbers.chunks_exact_mut(WIDTH).zip(indices) {
+            let cursor = self.cursor;
+            match self.row(index, row) {
+                Ok(()) => n_read += WIDTH,
+                Err(error) if n_read == 0 => return Err(Box::new(malformed(error))),
+                Err(_) => {
+                    self.cursor = cursor;
+                    break;
+                }
             }
-        };
-        let read = cursor.record(vertices, index / WIDTH, take, |place| columns.contains(&place));
-        read.map(|()| WIDTH).map_err(|error| Box::new(malformed(error)))
+        }
+        Ok(n_read)
     }
 }

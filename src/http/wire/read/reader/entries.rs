@@ -3,10 +3,10 @@
 use serde::de::{DeserializeSeed, Error as _, SeqAccess};
 use serde_json::Error;
 
+use super::Value;
+use super::source::Source;
 use super::state::{Reader, Stop};
-use super::table::Cells;
 use super::text::Token;
-use super::{Source, Value};
 use crate::http::wire::read::limits::{Excess, List};
 
 /// Entries that a list is granted at a time. Within a grant, counting an entry is a single decrement.
@@ -15,9 +15,12 @@ const ENTRIES_PER_GRANT: usize = 64;
 /// The entries of a list, all counted, of which at most `max_length` are kept.
 pub(super) struct Entries<'r, 'a> {
     reader: &'r mut Reader<'a>,
-    /// The list in a table, if it is not in the text. Its length is known beforehand.
-    cells: Option<Cells>,
+    /// Number of entries, which is known beforehand if they are not in the text.
+    known_length: Option<usize>,
+    source_of_entry: Source,
     list: List,
+    /// Kind of list that an entry is, if it is a list.
+    list_of_entry: List,
     /// Lists and objects around an entry.
     depth: usize,
     max_length: usize,
@@ -34,16 +37,24 @@ impl<'r, 'a> Entries<'r, 'a> {
     #[inline(always)]
     pub(super) fn new(list: Value<'r, 'a>) -> Self {
         let Value { reader, source, list, depth } = list;
-        let cells = match source {
-            Source::Cells(cells) => Some(cells),
-            Source::Text(_) | Source::Tables(_) | Source::Number(_) => None,
-        };
+        let known_length = source.length();
         let max_length = reader.context.max_entries(list);
         // A row gets its first grant when it is created. A row of a table may be too long from the start.
-        let fits = cells.is_none_or(|cells| cells.length <= max_length);
+        let fits = known_length.is_none_or(|length| length <= max_length);
         let n_granted = if list == List::Coordinates && fits { max_length.min(ENTRIES_PER_GRANT) } else { 0 };
-        let (n_left, depth) = (n_granted, depth + 1);
-        Self { reader, cells, list, depth, max_length, n_granted, n_left, is_first: true, is_over: false }
+        Self {
+            reader,
+            known_length,
+            source_of_entry: source.of_entry(),
+            list,
+            list_of_entry: list.of_entries(),
+            depth: depth + 1,
+            max_length,
+            n_granted,
+            n_left: n_granted,
+            is_first: true,
+            is_over: false,
+        }
     }
 
     /// Checks that no entry is left, since types of a fixed length read no more than that.
@@ -60,35 +71,27 @@ impl<'r, 'a> Entries<'r, 'a> {
     /// Whether another entry follows.
     #[inline(always)]
     fn goes_on(&mut self) -> Result<bool, Error> {
-        let goes_on = match self.cells {
-            Some(cells) => self.length() < cells.length,
+        let goes_on = match self.known_length {
+            Some(length) => self.length() < length,
             None => self.reader.text.goes_on(b']', &mut self.is_first)?,
         };
-        self.is_over = !goes_on;
+        if !goes_on {
+            self.is_over = true;
+        }
         Ok(goes_on)
     }
 
-    /// The value of the next entry, if there is one.
+    /// The value of the next entry.
     #[inline(always)]
-    fn next(&mut self) -> Result<Option<Value<'_, 'a>>, Error> {
-        if !self.goes_on()? {
-            return Ok(None);
-        }
-        let (at, list) = (self.length(), self.list.of_entries());
-        let source = match self.cells {
-            None => Source::Text(0..0),
-            Some(cells) => match cells.row(at) {
-                Some(row) => Source::Cells(row),
-                None => Source::Number(self.reader.number(cells.table, cells.start + at)?),
-            },
-        };
-        Ok(Some(Value { reader: &mut *self.reader, source, list, depth: self.depth }))
+    fn value(&mut self) -> Value<'_, 'a> {
+        let (source, list) = (self.source_of_entry, self.list_of_entry);
+        Value { reader: &mut *self.reader, source, list, depth: self.depth }
     }
 
     fn is_granted_more(&mut self) -> Result<bool, Error> {
         self.reader.tick()?;
         let n_free = self.max_length - self.n_granted;
-        if self.cells.is_some_and(|cells| cells.length > self.max_length) {
+        if self.known_length.is_some_and(|length| length > self.max_length) {
             return Ok(false);
         }
         self.n_left = n_free.min(ENTRIES_PER_GRANT);
@@ -102,8 +105,8 @@ impl<'r, 'a> Entries<'r, 'a> {
     /// then reports the number of rows as well.
     #[cold]
     fn count(&mut self, width: Option<usize>) -> Result<(), Error> {
-        let length = match self.cells {
-            Some(cells) => cells.length,
+        let length = match self.known_length {
+            Some(length) => length,
             None => self.count_text()?,
         };
         self.is_over = true;
@@ -134,8 +137,10 @@ impl<'r, 'a> Entries<'r, 'a> {
 
     /// Skips an entry: a number or a row of numbers. Returns whether there was one.
     fn pass(&mut self) -> Result<bool, Error> {
-        let Some(entry) = self.next()? else { return Ok(false) };
-        let mut entry = Value { list: List::Other, ..entry };
+        if !self.goes_on()? {
+            return Ok(false);
+        }
+        let mut entry = Value { list: List::Other, ..self.value() };
         match entry.token()? {
             Token::Unsigned(_) | Token::Signed(_) | Token::Float(_) => {}
             Token::List => {
@@ -156,15 +161,15 @@ impl<'a> SeqAccess<'a> for Entries<'_, 'a> {
         if self.n_left == 0 && !self.is_granted_more()? {
             return self.count(None).map(|()| None);
         }
-        let entry = match self.next() {
-            Ok(Some(value)) => seed.deserialize(value),
-            Ok(None) => return Ok(None),
+        let entry = match self.goes_on() {
+            Ok(true) => seed.deserialize(self.value()),
+            Ok(false) => return Ok(None),
             Err(error) => Err(error),
         };
         match entry {
             Ok(entry) => {
                 self.n_left -= 1;
-                if self.list.of_entries() == List::Coordinates
+                if self.list_of_entry == List::Coordinates
                     && let Some(width) = self.reader.too_wide.take()
                 {
                     return self.count(Some(width)).map(|()| None);
@@ -177,8 +182,8 @@ impl<'a> SeqAccess<'a> for Entries<'_, 'a> {
 
     /// Capped at the limit: callers reserve memory for this many entries.
     fn size_hint(&self) -> Option<usize> {
-        let expected = match self.cells {
-            Some(cells) => Some(cells.length - self.length()),
+        let expected = match self.known_length {
+            Some(length) => Some(length - self.length()),
             None if self.is_first => self.reader.text.expected_entries(),
             None => None,
         };

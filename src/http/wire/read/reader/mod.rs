@@ -24,12 +24,12 @@
 
 mod entries;
 mod object;
+mod source;
 mod state;
 mod table;
 mod text;
 
 use std::borrow::Cow;
-use std::ops::Range;
 
 use serde::de::{DeserializeOwned, Deserializer, Error as _, IntoDeserializer, Visitor};
 use serde::forward_to_deserialize_any;
@@ -38,8 +38,8 @@ use serde_json::Error;
 use super::limits::List;
 use entries::Entries;
 use object::{GIVEN_TWICE, Members};
+use source::{Source, Tables};
 pub use state::{Reader, Stop};
-use table::Cells;
 pub use table::{Given, Named, Table};
 use text::Token;
 
@@ -58,7 +58,7 @@ const BELONGS_IN_A_TENSOR: &str = "numbers belong in tensors: send this list as 
 /// Returns the error of the type, or that of a text which is not JSON. [`Reader::into_failure`] says more
 /// about it.
 pub fn read<T: DeserializeOwned>(reader: &mut Reader<'_>) -> Result<T, Error> {
-    let source = Source::Text(0..reader.tables.len());
+    let source = Source::TextAndTables(Tables { start: 0, end: reader.tables.len() });
     let request = T::deserialize(Value { reader, source, list: List::Other, depth: 0 })?;
     reader.text.end().map(|()| request)
 }
@@ -73,33 +73,19 @@ struct Value<'r, 'a> {
     depth: usize,
 }
 
-/// Where a value comes from.
-enum Source {
-    /// The next value of the text, and the tables that belong into it if it is an object.
-    Text(Range<usize>),
-    /// An object that is not in the text and consists of tables.
-    Tables(Range<usize>),
-    /// A list in a table.
-    Cells(Cells),
-    /// A number of a table.
-    Number(f64),
-}
-
 impl<'r, 'a> Value<'r, 'a> {
     /// Reads the value, or the beginning of a list or an object.
     fn token(&mut self) -> Result<Token<'a>, Error> {
-        match &self.source {
-            Source::Text(tables) => {
-                let is_alone = tables.is_empty();
-                self.token_of_text(is_alone)
-            }
+        match self.source {
+            Source::Text => self.token_of_text(Tables::NONE),
+            Source::TextAndTables(tables) => self.token_of_text(tables),
             Source::Tables(_) => Ok(Token::Object),
-            Source::Cells(_) => Ok(Token::List),
-            Source::Number(x) => Ok(Token::Float(*x)),
+            Source::List { .. } => Ok(Token::List),
+            Source::Number => self.reader.number().map(Token::Float),
         }
     }
 
-    fn token_of_text(&mut self, is_alone: bool) -> Result<Token<'a>, Error> {
+    fn token_of_text(&mut self, tables: Tables) -> Result<Token<'a>, Error> {
         let Self { reader, list, depth, .. } = self;
         let token = reader.text.token()?;
         if matches!(token, Token::Object | Token::List) && *depth == MAX_NESTING {
@@ -115,13 +101,25 @@ impl<'r, 'a> Value<'r, 'a> {
             _ => {}
         }
         // Tables belong into objects only.
-        if !is_alone {
+        if tables.start < tables.end {
             return Err(Error::custom(GIVEN_TWICE));
         }
         Ok(match token {
             Token::String(string) => Token::String(shortened(string)),
             token => token,
         })
+    }
+
+    /// Reads the beginning of a list, if it is a list that belongs here. A shortcut for the rows of points.
+    #[inline(always)]
+    fn opens_list(&mut self) -> bool {
+        match self.source {
+            Source::List { .. } => true,
+            Source::Text if self.depth < MAX_NESTING && !self.reader.are_numbers_in_tables => {
+                self.reader.text.opens_list()
+            }
+            Source::Text | Source::TextAndTables(_) | Source::Tables(_) | Source::Number => false,
+        }
     }
 
     /// Shows the list whose beginning was read to a visitor.
@@ -151,17 +149,18 @@ impl<'de> Deserializer<'de> for Value<'_, 'de> {
 
     #[inline(always)]
     fn deserialize_f64<V: Visitor<'de>>(mut self, visitor: V) -> Result<V::Value, Error> {
-        match &self.source {
-            Source::Number(x) => visitor.visit_f64(*x),
-            Source::Text(tables) if tables.is_empty() && self.reader.text.is_number() => {
-                visitor.visit_f64(self.reader.text.number()?)
-            }
+        match self.source {
+            Source::Text if self.reader.text.is_number() => visitor.visit_f64(self.reader.text.number()?),
+            Source::Number => visitor.visit_f64(self.reader.number()?),
             _ => Err(self.token()?.refused(&visitor)),
         }
     }
 
     #[inline(always)]
     fn deserialize_seq<V: Visitor<'de>>(mut self, visitor: V) -> Result<V::Value, Error> {
+        if self.opens_list() {
+            return self.visit_list(visitor);
+        }
         match self.token()? {
             Token::List => self.visit_list(visitor),
             other => Err(other.refused(&visitor)),
@@ -209,8 +208,10 @@ impl<'de> Deserializer<'de> for Value<'_, 'de> {
 
     /// Skips a value without limits, because nothing of it is kept.
     fn deserialize_ignored_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
-        if let Source::Text(_) = self.source {
-            self.reader.text.skip()?;
+        match self.source {
+            Source::Text | Source::TextAndTables(_) => self.reader.text.skip()?,
+            Source::Tables(_) => {}
+            Source::List { .. } | Source::Number => return self.deserialize_any(visitor),
         }
         visitor.visit_unit()
     }

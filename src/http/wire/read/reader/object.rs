@@ -3,15 +3,15 @@
 //! No intermediate document is built, so a request takes no more memory than its numbers.
 
 use std::borrow::Cow;
-use std::ops::Range;
 
 use serde::de::value::StrDeserializer;
 use serde::de::{DeserializeSeed, Error as _, MapAccess};
 use serde_json::Error;
 
+use super::source::{Source, Tables};
 use super::state::{Operation, Reader};
-use super::table::{Cells, Named};
-use super::{Source, Value, shortened};
+use super::table::Named;
+use super::{Value, shortened};
 use crate::http::wire::read::limits::List;
 
 /// Name of the member that a request can have beside its own.
@@ -27,12 +27,12 @@ pub(super) struct Members<'r, 'a> {
     is_in_text: bool,
     is_first: bool,
     /// The tables of the object.
-    tables: Range<usize>,
+    tables: Tables,
     /// Lists and objects around this one.
     depth: usize,
     /// The current member: its name, and the tables that belong to it.
     name: Cow<'a, str>,
-    of_name: Range<usize>,
+    of_name: Tables,
 }
 
 impl<'r, 'a> Members<'r, 'a> {
@@ -40,11 +40,12 @@ impl<'r, 'a> Members<'r, 'a> {
     pub(super) fn new(object: Value<'r, 'a>) -> Self {
         let Value { reader, source, depth, .. } = object;
         let (is_in_text, tables) = match source {
-            Source::Text(tables) => (true, tables),
+            Source::TextAndTables(tables) => (true, tables),
             Source::Tables(tables) => (false, tables),
-            Source::Cells(_) | Source::Number(_) => (false, 0..0),
+            Source::Text | Source::List { .. } | Source::Number => (true, Tables::NONE),
         };
-        Self { reader, is_in_text, is_first: true, tables, depth, name: Cow::Borrowed(""), of_name: 0..0 }
+        let (name, of_name) = (Cow::Borrowed(""), Tables::NONE);
+        Self { reader, is_in_text, is_first: true, tables, depth, name, of_name }
     }
 
     /// Goes on to the next member that the type may see. Returns whether there is one.
@@ -64,7 +65,7 @@ impl<'r, 'a> Members<'r, 'a> {
 
     fn next_name(&mut self) -> Result<bool, Error> {
         self.is_in_text = self.is_in_text && self.reader.text.goes_on(b'}', &mut self.is_first)?;
-        let tables = &mut self.reader.tables[self.tables.clone()];
+        let tables = &mut self.reader.tables[self.tables.start..self.tables.end];
         let name = if self.is_in_text {
             self.reader.text.name()?
         } else {
@@ -75,31 +76,21 @@ impl<'r, 'a> Members<'r, 'a> {
         let is_of_name = |table: &Named<'_>| table.name_at(self.depth) == Some(&name);
         let start = self.tables.start + tables.iter().take_while(|table| !is_of_name(table)).count();
         let n = tables.iter_mut().filter(|table| is_of_name(table)).map(Named::reach).count();
-        self.of_name = start..start + n;
+        self.of_name = Tables { start, end: start + n };
         self.name = shortened(name);
         Ok(true)
     }
 
     /// Where the value of the current member comes from.
     fn source(&mut self) -> Result<Source, Error> {
-        let tables = self.of_name.clone();
-        let is_table = |at: usize| self.reader.tables[at].path.len() == self.depth + 1;
-        match (self.is_in_text, tables.clone().any(is_table)) {
-            (false, true) if tables.len() == 1 => self.table(tables.start),
+        let Tables { start, end } = self.of_name;
+        let is_table = |table: &Named<'_>| table.path.len() == self.depth + 1;
+        match (self.is_in_text, self.reader.tables[start..end].iter().any(is_table)) {
+            (false, true) if end == start + 1 => self.reader.open(start),
             (_, true) => Err(Error::custom(GIVEN_TWICE)),
-            (true, false) => Ok(Source::Text(tables)),
-            (false, false) => Ok(Source::Tables(tables)),
-        }
-    }
-
-    fn table(&mut self, table: usize) -> Result<Source, Error> {
-        self.reader.open();
-        match &self.reader.tables[table].table {
-            Ok(cells) => {
-                let (length, width) = (cells.length(), cells.width());
-                Ok(Source::Cells(Cells { table, start: 0, length, width }))
-            }
-            Err(reason) => Err(Error::custom(reason)),
+            (true, false) if start == end => Ok(Source::Text),
+            (true, false) => Ok(Source::TextAndTables(self.of_name)),
+            (false, false) => Ok(Source::Tables(self.of_name)),
         }
     }
 }

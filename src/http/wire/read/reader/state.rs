@@ -3,6 +3,7 @@
 use serde::de::Error as _;
 use serde_json::Error;
 
+use super::source::Source;
 use super::table::{Block, Named};
 use super::text::Text;
 use crate::http::problem::Problem;
@@ -33,7 +34,8 @@ pub struct Reader<'a> {
     pub(super) text: Text<'a>,
     /// Those of an object stand side by side.
     pub(super) tables: Vec<Named<'a>>,
-    /// The numbers of a table that are being read.
+    /// Index of the table that is being read, and numbers of it.
+    table: usize,
     block: Block,
     /// Whether lists of numbers are tables, and in the text only when they are empty.
     pub(super) are_numbers_in_tables: bool,
@@ -53,6 +55,7 @@ impl<'a> Reader<'a> {
             context,
             text: Text::new(text),
             tables: Vec::new(),
+            table: 0,
             block: Block::EMPTY,
             are_numbers_in_tables: false,
             operation: Operation::Shown,
@@ -111,31 +114,42 @@ impl<'a> Reader<'a> {
         error
     }
 
-    /// Starts to read a table from its first number on.
-    pub(super) fn open(&mut self) {
-        self.block = Block::EMPTY;
+    /// Starts to read a table. Returns it as a list.
+    pub(super) fn open(&mut self, table: usize) -> Result<Source, Error> {
+        (self.table, self.block) = (table, Block::EMPTY);
+        match &self.tables[table].table {
+            Ok(table) => Ok(Source::List { length: table.length(), width: table.width() }),
+            Err(reason) => Err(Error::custom(reason)),
+        }
     }
 
-    /// Reads a number of the table that was opened, by its index in the table.
+    /// Reads the next number of the table.
     #[inline]
-    pub(super) fn number(&mut self, table: usize, index: usize) -> Result<f64, Error> {
-        if self.block.get(index).is_none() {
-            self.fill(table, index)?;
-        }
-        match self.block.get(index) {
-            Some(x) if x.is_finite() => Ok(x),
-            x => Err(Error::custom(format!("{} is not finite", x.unwrap_or(f64::NAN)))),
-        }
+    pub(super) fn number(&mut self) -> Result<f64, Error> {
+        let x = match self.block.next() {
+            Some(x) => x,
+            None => self.number_of_next_block()?,
+        };
+        if x.is_finite() { Ok(x) } else { Err(not_finite(x)) }
     }
 
-    fn fill(&mut self, table: usize, index: usize) -> Result<(), Error> {
-        let Ok(table) = &mut self.tables[table].table else { return Ok(()) };
-        match table.read(index, &mut self.block.numbers) {
-            Ok(length) => (self.block.start, self.block.length) = (index, length),
-            Err(problem) => return Err(self.stopped(Stop::Malformed(problem))),
+    #[inline(never)]
+    fn number_of_next_block(&mut self) -> Result<f64, Error> {
+        let filled = match &mut self.tables[self.table].table {
+            Ok(table) => self.block.fill(table.as_mut()),
+            Err(_) => Ok(()),
+        };
+        match filled {
+            // NaN stands for numbers beyond the end.
+            Ok(()) => Ok(self.block.next().unwrap_or(f64::NAN)),
+            Err(problem) => Err(self.stopped(Stop::Malformed(problem))),
         }
-        Ok(())
     }
+}
+
+#[cold]
+fn not_finite(x: f64) -> Error {
+    Error::custom(format!("{x} is not finite"))
 }
 
 /// Why a parse failed, apart from the error itself.

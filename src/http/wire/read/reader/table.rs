@@ -13,7 +13,7 @@ pub trait Table {
     /// Numbers per row, or `None` for a list of numbers.
     fn width(&self) -> Option<usize>;
 
-    /// Reads numbers from an index on, row by row. Returns how many they are, at least one.
+    /// Reads numbers from an index on, row by row. Returns how many they are, none after the last one.
     ///
     /// The index is 0, or follows the last number that was read.
     ///
@@ -49,40 +49,35 @@ impl<'a> Named<'a> {
     }
 }
 
-/// A list in a table: all of it, or a row.
-#[derive(Clone, Copy)]
-pub(super) struct Cells {
-    /// Index of the table.
-    pub(super) table: usize,
-    /// Index of the first number.
-    pub(super) start: usize,
-    /// Entries of the list.
-    pub(super) length: usize,
-    /// Numbers per entry, or `None` for a list of numbers.
-    pub(super) width: Option<usize>,
-}
-
-impl Cells {
-    /// The row at an index, if this is a list of rows.
-    pub(super) fn row(self, index: usize) -> Option<Self> {
-        let length = self.width?;
-        Some(Self { start: self.start + index * length, length, width: None, ..self })
-    }
-}
-
-/// Consecutive numbers of a table.
+/// Consecutive numbers of a table, read one by one.
 pub(super) struct Block {
-    pub(super) start: usize,
-    pub(super) length: usize,
-    pub(super) numbers: [f64; NUMBERS_PER_BLOCK],
+    numbers: [f64; NUMBERS_PER_BLOCK],
+    length: usize,
+    next: usize,
+    /// Numbers of the table before this block.
+    n_before: usize,
 }
 
 impl Block {
-    pub(super) const EMPTY: Self = Self { start: 0, length: 0, numbers: [0.0; NUMBERS_PER_BLOCK] };
+    pub(super) const EMPTY: Self =
+        Self { numbers: [0.0; NUMBERS_PER_BLOCK], length: 0, next: 0, n_before: 0 };
 
-    /// The number at an index of the table, if the block has it.
+    /// The next number, unless the block is used up.
     #[inline]
-    pub(super) fn get(&self, index: usize) -> Option<f64> {
-        self.numbers[..self.length].get(index.wrapping_sub(self.start)).copied()
+    pub(super) fn next(&mut self) -> Option<f64> {
+        let x = self.numbers[..self.length].get(self.next).copied();
+        self.next += usize::from(x.is_some());
+        x
+    }
+
+    /// Goes on to the next numbers of the table.
+    ///
+    /// # Errors
+    /// Returns the error of the table.
+    pub(super) fn fill(&mut self, table: &mut dyn Table) -> Result<(), Box<Problem>> {
+        self.n_before += self.length;
+        (self.length, self.next) = (0, 0);
+        self.length = table.read(self.n_before, &mut self.numbers)?;
+        Ok(())
     }
 }

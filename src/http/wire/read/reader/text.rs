@@ -118,6 +118,16 @@ impl<'a> Text<'a> {
         Ok(true)
     }
 
+    /// Reads the bracket that opens a list, if there is one.
+    #[inline(always)]
+    pub(super) fn opens_list(&mut self) -> bool {
+        let opens = self.peek() == Some(b'[');
+        if opens {
+            self.rest = &self.rest[1..];
+        }
+        opens
+    }
+
     /// Reads a value, or the bracket that opens a list or an object.
     pub(super) fn token(&mut self) -> Result<Token<'a>, Error> {
         Ok(match self.peek() {
