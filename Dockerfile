@@ -12,7 +12,7 @@ RUN --mount=type=cache,id=gramian-registry,target=/usr/local/cargo/registry,shar
     --mount=type=cache,id=gramian-target,target=/target,sharing=locked \
     touch src/lib.rs src/main.rs numerics/src/lib.rs \
     && CARGO_TARGET_DIR=/target CARGO_PROFILE_RELEASE_DEBUG=false CARGO_PROFILE_RELEASE_STRIP=symbols \
-       cargo build --release --locked --bin gramian \
+       cargo build --release --locked --all-features --bin gramian \
     && install /target/release/gramian /usr/local/bin/gramian \
     && mkdir /store
 

@@ -47,7 +47,7 @@ def output(*command):
 
 def build():
     """Builds the benchmark and returns the path of its binary."""
-    command = ["cargo", "bench", "--locked", "--bench", "instructions", "--no-run", "--message-format=json"]
+    command = ["cargo", "bench", "--locked", "--all-features", "--bench", "instructions", "--no-run", "--message-format=json"]
     messages = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True).stdout
     found = [json.loads(line).get("executable") for line in messages.splitlines() if '"instructions"' in line]
     return next(path for path in found if path)

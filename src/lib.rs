@@ -13,9 +13,11 @@ pub mod store;
 pub mod http;
 
 pub mod config;
+pub mod features;
 pub mod files;
 mod machine;
 mod memory;
+mod process;
 pub mod server;
 pub mod signals;
 pub mod telemetry;

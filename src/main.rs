@@ -47,6 +47,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
+    server::install_provider();
     let Arguments { config, command } = Arguments::parse();
     let outcome = match command {
         Some(Command::Health) => match server::is_ready(config.bind, config.tls_certificate.is_some()) {

@@ -25,12 +25,11 @@ use tower_http::cors::{AllowOrigin, CorsLayer};
 use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
-use utoipa_swagger_ui::SwaggerUi;
 
 use crate::config::Origins;
 use around::{authentication, middleware};
 use jobs::Runner;
-use routes::pages::viewer;
+use routes::pages::{documentation, viewer};
 pub use routes::reading;
 use routes::surface::{curvatures, laplace_beltrami, level_set, normals, surface_gradient};
 use routes::tiles::{coarse, regions, sides};
@@ -54,10 +53,9 @@ pub fn router(app: Arc<App>) -> (Router, Runner) {
         .route("/page/{*path}", get(viewer::get_page_file))
         .route("/openapi.json", document)
         .route("/openapi-3.0.json", document_3_0)
-        .merge(
-            SwaggerUi::new("/docs")
-                .config(utoipa_swagger_ui::Config::from("/openapi.json").validator_url("none")),
-        )
+        .route("/docs", get(documentation::get_documentation))
+        .route("/docs/", get(documentation::get_documentation_page))
+        .route("/docs/{*path}", get(documentation::get_documentation_file))
         .fallback(middleware::not_found)
         .method_not_allowed_fallback(middleware::method_not_allowed)
         .layer(recover())

@@ -28,6 +28,7 @@ use activity::Activity;
 use connection::Patience;
 pub use probe::is_ready;
 use tls::Tls;
+pub use tls::install_provider;
 
 /// Interval at which a draining server looks whether requests are still being computed.
 const DRAINING_INTERVAL: Duration = Duration::from_millis(20);

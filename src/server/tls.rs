@@ -8,7 +8,7 @@ use arc_swap::ArcSwap;
 use tokio::net::TcpStream;
 use tokio_rustls::TlsAcceptor;
 use tokio_rustls::rustls::ServerConfig;
-use tokio_rustls::rustls::crypto::{CryptoProvider, aws_lc_rs};
+use tokio_rustls::rustls::crypto::{CryptoProvider, ring};
 use tokio_rustls::rustls::pki_types::pem::PemObject;
 use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use tokio_rustls::server::TlsStream;
@@ -78,7 +78,14 @@ impl Tls {
 
 /// The cryptographic provider shared by server and probe.
 pub fn provider() -> Arc<CryptoProvider> {
-    Arc::new(aws_lc_rs::default_provider())
+    Arc::new(ring::default_provider())
+}
+
+/// Makes that provider the one of the process, for clients that choose none: those of buckets and collectors
+/// refuse to be made without. A second call changes nothing.
+pub fn install_provider() {
+    // It fails if there is one already.
+    let _ = ring::default_provider().install_default();
 }
 
 fn read(certificate: &Path, key: &Path) -> Result<(ServerConfig, Digest), String> {

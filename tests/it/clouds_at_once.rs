@@ -11,7 +11,7 @@ use crate::common::random::Random;
 use crate::contract::Received;
 use crate::durable::Folder;
 use crate::process::Process;
-use crate::support::{Server, receive};
+use crate::support::{Server, http_client, receive};
 
 const N_CLIENTS: usize = 8;
 
@@ -30,7 +30,7 @@ fn points(cloud: usize) -> Value {
 }
 
 async fn ask(url: String, method: Method, body: Option<&Value>) -> Received {
-    let request = reqwest::Client::new().request(method, url);
+    let request = http_client().request(method, url);
     receive(match body {
         Some(body) => request.json(body),
         None => request,

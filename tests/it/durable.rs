@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::common::random::Random;
 use crate::process::Process;
-use crate::support::{fibonacci_sphere, receive};
+use crate::support::{fibonacci_sphere, http_client, receive};
 
 /// A temporary folder, removed at the end of the test.
 pub struct Folder(PathBuf);
@@ -59,13 +59,13 @@ fn points(shift: f64, n: usize) -> Value {
 }
 
 async fn post(process: &Process, path: &str, body: &Value) -> (u16, Value) {
-    let client = reqwest::Client::new();
+    let client = http_client();
     let answer = receive(client.post(process.url(path)).json(body)).await;
     (answer.status, serde_json::from_slice(&answer.bytes).unwrap())
 }
 
 async fn get(process: &Process, path: &str) -> (u16, Value) {
-    let answer = receive(reqwest::Client::new().get(process.url(path))).await;
+    let answer = receive(http_client().get(process.url(path))).await;
     (answer.status, serde_json::from_slice(&answer.bytes).unwrap())
 }
 
@@ -104,7 +104,7 @@ async fn clouds_are_there_after_the_process_was_killed() {
     // Points that are already stored are recognised.
     let (status, known) = post(&process, "/v1/clouds", &json!({"points": points(1.0, 40)})).await;
     assert_eq!((status, &known["cloud_id"]), (200, &json!(inline)));
-    let deleted = receive(reqwest::Client::new().delete(process.url(&format!("/v1/clouds/{id}")))).await;
+    let deleted = receive(http_client().delete(process.url(&format!("/v1/clouds/{id}")))).await;
     assert_eq!(deleted.status, 204);
     kill(process);
 
@@ -134,7 +134,7 @@ async fn no_moment_to_be_killed_at_loses_what_was_acknowledged() {
             let mut done = Vec::new();
             for k in 0..40 {
                 let points = points(f64::from(100 * moment + k), 60);
-                let request = reqwest::Client::new().post(&url).json(&json!({"points": points}));
+                let request = http_client().post(&url).json(&json!({"points": points}));
                 let Ok(answer) = request.send().await else { break };
                 let Ok(text) = answer.text().await else { break };
                 let Ok(cloud) = serde_json::from_str::<Value>(&text) else { break };
@@ -177,7 +177,7 @@ fn large_fit() -> Value {
 
 /// Returns how many solvers of a kind a process has prepared, and how many damaged objects it found.
 async fn counts(process: &Process, kind: &str) -> (String, String) {
-    let metrics = receive(reqwest::Client::new().get(process.url("/metrics"))).await;
+    let metrics = receive(http_client().get(process.url("/metrics"))).await;
     let text = String::from_utf8(metrics.bytes).unwrap();
     let value = |name: &str| {
         let line = text.lines().find(|line| line.starts_with(name)).unwrap();
@@ -228,7 +228,7 @@ async fn a_factor_is_read_instead_of_made_again() {
     wait_for_factor().await;
 
     let id = first["diagnostics"]["cloud_id"].as_str().unwrap();
-    let deleted = receive(reqwest::Client::new().delete(process.url(&format!("/v1/clouds/{id}")))).await;
+    let deleted = receive(http_client().delete(process.url(&format!("/v1/clouds/{id}")))).await;
     assert_eq!((deleted.status, factors()), (204, vec![]));
 }
 
@@ -316,7 +316,7 @@ async fn catching_up_brings_nothing_back_that_was_deleted() {
     let [one, two] = [Process::start(&flags), Process::start(&flags)];
     let path_of = |cloud: Value| format!("/v1/clouds/{}", cloud["cloud_id"].as_str().unwrap());
     let deleted = path_of(post(&one, "/v1/clouds", &json!({"points": points(0.0, 30)})).await.1);
-    assert_eq!(receive(reqwest::Client::new().delete(two.url(&deleted))).await.status, 204);
+    assert_eq!(receive(http_client().delete(two.url(&deleted))).await.status, 204);
     // The first process has it in memory, and another cloud that the store does not take.
     fs::remove_dir_all(folder.0.join("everyone")).ok();
     fs::write(folder.0.join("everyone"), b"").unwrap();
@@ -347,7 +347,7 @@ async fn a_damaged_cloud_is_whole_again_once_it_is_posted_again() {
     kill(process);
     let process = Process::start(&folder.flags());
     assert_eq!(get(&process, &format!("/v1/clouds/{id}")).await.0, 200);
-    let deleted = receive(reqwest::Client::new().delete(process.url(&format!("/v1/clouds/{id}")))).await;
+    let deleted = receive(http_client().delete(process.url(&format!("/v1/clouds/{id}")))).await;
     assert_eq!(deleted.status, 204);
     let left: Vec<_> =
         folder.files().into_iter().filter(|file| file.to_string_lossy().contains(id)).collect();
@@ -362,13 +362,13 @@ async fn what_another_process_deletes_is_gone_and_can_be_posted_again() {
     let (_, cloud) = post(&one, "/v1/clouds", &body).await;
     let path = format!("/v1/clouds/{}", cloud["cloud_id"].as_str().unwrap());
     assert_eq!(get(&two, &path).await, (200, cloud));
-    let deleted = receive(reqwest::Client::new().delete(two.url(&path))).await;
+    let deleted = receive(http_client().delete(two.url(&path))).await;
     assert_eq!((deleted.status, get(&two, &path).await.0), (204, 404));
     // The first process still has it in memory. But its list is the store's, and a new acknowledgement holds.
     assert_eq!(get(&one, "/v1/clouds").await.1["clouds"], json!([]));
     let (status, again) = post(&one, "/v1/clouds", &body).await;
     assert_eq!((status, get(&two, &path).await), (201, (200, again)));
-    receive(reqwest::Client::new().delete(two.url(&path))).await;
+    receive(http_client().delete(two.url(&path))).await;
     // After ten seconds at most.
     while get(&one, &path).await.0 == 200 {
         tokio::task::yield_now().await;
@@ -433,7 +433,7 @@ async fn what_could_not_be_read_again_is_not_kept() {
     assert_eq!(get(&process, &format!("/v1/clouds/{id}")).await.0, 500);
     let request =
         json!({"cloud": {"id": id}, "kernel": {"family": "matern", "length_scale": 1.0}, "alpha": 1.0});
-    let asking = reqwest::Client::new().post(process.url("/v1/normals")).header("prefer", "respond-async");
+    let asking = http_client().post(process.url("/v1/normals")).header("prefer", "respond-async");
     let accepted = asking.json(&request).send().await.unwrap();
     let path = accepted.headers()["location"].to_str().unwrap().to_owned();
     let (status, problem) = get(&process, &format!("{path}/result")).await;

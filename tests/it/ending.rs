@@ -8,10 +8,10 @@ use serde_json::Value;
 
 use crate::contract::{self, Received};
 use crate::process::{Process, curvatures, get, gramian, logged};
-use crate::support::receive;
+use crate::support::{http_client, receive};
 
 fn spawn_post(process: &Process, path: &str, body: &Value) -> tokio::task::JoinHandle<(u16, Value)> {
-    let request = reqwest::Client::new().post(process.url(path)).json(body);
+    let request = http_client().post(process.url(path)).json(body);
     tokio::spawn(async move {
         let answer = receive(request).await;
         (answer.status, answer.json().unwrap())

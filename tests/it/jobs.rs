@@ -6,12 +6,12 @@ use crate::durable::Folder;
 use crate::limits::slow_request;
 use crate::process::Process;
 use crate::routes::{ROUTES, route_of};
-use crate::support::{Answer, Server, fibonacci_sphere, receive};
+use crate::support::{Answer, Server, fibonacci_sphere, http_client, receive};
 
 /// Asks for a job and returns its path. The answer is not checked against the document, which has no 202,
 /// since that status depends on a header of the request.
 pub async fn ask(url: String, body: &Value, headers: &[(&str, &str)]) -> String {
-    let mut request = reqwest::Client::new().post(url).header("prefer", "wait=5, respond-async").json(body);
+    let mut request = http_client().post(url).header("prefer", "wait=5, respond-async").json(body);
     for (name, value) in headers {
         request = request.header(*name, *value);
     }
@@ -267,7 +267,7 @@ async fn results_are_forgotten_after_their_time() {
 }
 
 async fn get(process: &Process, path: &str) -> Value {
-    let answer = receive(reqwest::Client::new().get(process.url(path))).await;
+    let answer = receive(http_client().get(process.url(path))).await;
     assert_eq!(answer.status, 200, "{}", String::from_utf8_lossy(&answer.bytes));
     serde_json::from_slice(&answer.bytes).unwrap()
 }
@@ -296,7 +296,7 @@ async fn a_job_survives_the_end_of_its_process() {
     // The new process cannot know yet whether the previous one is only slow.
     assert_eq!(get(&process, &path).await["status"], "running");
     let found = get(&process, &format!("{path}/result")).await;
-    let answer = receive(reqwest::Client::new().post(process.url("/v1/normals")).json(&long_request())).await;
+    let answer = receive(http_client().post(process.url("/v1/normals")).json(&long_request())).await;
     let expected: Value = serde_json::from_slice(&answer.bytes).unwrap();
     assert_eq!(numbers_of(found), numbers_of(expected));
     assert_eq!(get(&process, &path).await["status"], "succeeded");
@@ -311,10 +311,10 @@ async fn a_job_goes_on_elsewhere_when_its_process_is_told_to_end() {
     // The other process sees the job as well, with its progress.
     wait_for(&two, &path, "running").await;
     // A client that waits for the result at the first process is turned away with 503.
-    let waiting = reqwest::Client::new().get(one.url(&format!("{path}/result"))).send();
+    let waiting = http_client().get(one.url(&format!("{path}/result"))).send();
     let waiting = tokio::spawn(waiting);
     let is_there = async || {
-        let metrics = receive(reqwest::Client::new().get(one.url("/metrics"))).await;
+        let metrics = receive(http_client().get(one.url("/metrics"))).await;
         String::from_utf8(metrics.bytes).unwrap().contains("gramian_http_requests_in_flight 2\n")
     };
     while !is_there().await {
@@ -333,10 +333,10 @@ async fn a_job_is_cancelled_by_another_process() {
     let [one, two] = [Process::start(&folder.flags()), Process::start(&folder.flags())];
     let path = ask(one.url("/v1/normals"), &slow_request(), &[]).await;
     wait_for(&two, &path, "running").await;
-    assert_eq!(receive(reqwest::Client::new().delete(two.url(&path))).await.status, 204);
+    assert_eq!(receive(http_client().delete(two.url(&path))).await.status, 204);
     wait_for(&one, &path, "cancelled").await;
     let is_idle = async || {
-        let metrics = receive(reqwest::Client::new().get(one.url("/metrics"))).await;
+        let metrics = receive(http_client().get(one.url("/metrics"))).await;
         String::from_utf8(metrics.bytes).unwrap().contains("gramian_jobs{status=\"running\"} 0\n")
     };
     while !is_idle().await {
@@ -361,14 +361,14 @@ async fn a_job_that_waits_is_begun_by_whoever_has_a_turn_and_once() {
     assert_eq!(get(&one, &path).await["status"], "succeeded");
     assert_eq!(get(&one, &slow).await["status"], "running");
     let waits_for_nothing = async || {
-        let metrics = receive(reqwest::Client::new().get(one.url("/metrics"))).await;
+        let metrics = receive(http_client().get(one.url("/metrics"))).await;
         String::from_utf8(metrics.bytes).unwrap().contains("gramian_jobs{status=\"queued\"} 0\n")
     };
     while !waits_for_nothing().await {
         tokio::task::yield_now().await;
     }
     for path in [&slow, &path] {
-        assert_eq!(receive(reqwest::Client::new().delete(two.url(path))).await.status, 204);
+        assert_eq!(receive(http_client().delete(two.url(path))).await.status, 204);
     }
     let (_, log) = {
         two.terminate();
@@ -423,7 +423,7 @@ async fn jobs_of_one_key_leave_places_to_another() {
 async fn as_many_may_follow_jobs_as_half_of_the_connections() {
     let server = Server::with_flags(&["--threads", "1", "--max-connections", "8"]).await;
     let path = ask(server.url("/v1/normals"), &slow_request(), &[]).await;
-    let follow = || reqwest::Client::new().get(server.url(&format!("{path}/events"))).send();
+    let follow = || http_client().get(server.url(&format!("{path}/events"))).send();
     let mut following = Vec::new();
     for _ in 0..4 {
         let events = follow().await.unwrap();

@@ -11,7 +11,7 @@ use crate::jobs::{ask, delete, result};
 use crate::limits::slow_request;
 use crate::process::Process;
 use crate::routes::route_of;
-use crate::support::{Server, fibonacci_sphere, receive};
+use crate::support::{Server, fibonacci_sphere, http_client, receive};
 
 /// Returns a request for a matrix of n² numbers.
 fn matrix(n: usize) -> Value {
@@ -48,7 +48,7 @@ async fn results_that_nobody_reads_are_within_the_budget() {
     let process = Process::start(&["--threads", "2", "--memory-bytes", "402653184"]);
     let path = ask(process.url(MATRIX), &matrix(560), &[SAFETENSORS]).await;
     let path = format!("{path}/result");
-    let answer = receive(reqwest::Client::new().get(process.url(&path))).await;
+    let answer = receive(http_client().get(process.url(&path))).await;
     assert!(answer.status == 200 && answer.bytes.len() > 2_500_000, "{}", answer.bytes.len());
     let mut streams: Vec<_> = (0..250).map(|_| get_unread(&process, &path)).collect();
     for stream in &mut streams {
@@ -64,10 +64,7 @@ async fn results_that_nobody_reads_are_within_the_budget() {
     assert!(peak <= BUDGET, "{peak} bytes at the peak, {BUDGET} allowed");
     // Unread results are not lost: a client that reads receives the whole result, even after the job was
     // deleted.
-    assert_eq!(
-        receive(reqwest::Client::new().delete(process.url(&path[..path.len() - 7]))).await.status,
-        204
-    );
+    assert_eq!(receive(http_client().delete(process.url(&path[..path.len() - 7]))).await.status, 204);
     let mut text = Vec::new();
     let mut first = streams.swap_remove(0);
     first.set_read_timeout(Some(std::time::Duration::from_secs(2))).unwrap();
@@ -78,7 +75,7 @@ async fn results_that_nobody_reads_are_within_the_budget() {
 
 /// Returns the bytes of a part of the memory that a process has reserved.
 async fn reserved(process: &Process, part: &str) -> u64 {
-    let metrics = receive(reqwest::Client::new().get(process.url("/metrics"))).await.text().to_owned();
+    let metrics = receive(http_client().get(process.url("/metrics"))).await.text().to_owned();
     let name = format!("gramian_memory_used_bytes{{part=\"{part}\"}} ");
     let line = metrics.lines().find(|line| line.starts_with(&name)).unwrap();
     line[name.len()..].parse::<f64>().unwrap() as u64
@@ -90,7 +87,7 @@ async fn unread_results_of_a_directory_take_no_more_than_they_reserve() {
     let flags = [&folder.flags()[..], &["--threads", "2", "--memory-bytes", "402653184"]].concat();
     let process = Process::start(&flags);
     let path = format!("{}/result", ask(process.url(MATRIX), &matrix(560), &[]).await);
-    let answer = receive(reqwest::Client::new().get(process.url(&path))).await;
+    let answer = receive(http_client().get(process.url(&path))).await;
     assert!(answer.status == 200 && answer.bytes.len() > 6_000_000, "{}", answer.bytes.len());
     let (resident, work) = (process.peak_resident_bytes(), reserved(&process, "work").await);
     // All are read from the directory at once.

@@ -10,7 +10,7 @@ use serde_json::json;
 use crate::contract::Received;
 use crate::limits::slow_request;
 use crate::process::{Process, gramian, logged};
-use crate::support::receive;
+use crate::support::{http_client, receive};
 
 /// A temporary file of keys, removed when dropped.
 struct KeysFile(PathBuf);
@@ -52,7 +52,7 @@ fn key(name: &str, more: &str) -> (String, String) {
 }
 
 async fn list(process: &Process, key: &str) -> Received {
-    receive(reqwest::Client::new().get(process.url("/v1/clouds")).bearer_auth(key)).await
+    receive(http_client().get(process.url("/v1/clouds")).bearer_auth(key)).await
 }
 
 #[tokio::test]
@@ -62,7 +62,7 @@ async fn keys_of_a_file_are_replaced_without_a_restart() {
     let (new, lines_of_new) = key("lab-next", "view = \"lab\"");
     let file = KeysFile::new("rotation", &[&lines_of_old, &lines_of_other]);
     let process = file.start();
-    let posting = reqwest::Client::new().post(process.url("/v1/clouds")).bearer_auth(&old);
+    let posting = http_client().post(process.url("/v1/clouds")).bearer_auth(&old);
     assert_eq!(receive(posting.json(&json!({"points": [[0, 1], [1, 0]]}))).await.status, 201);
     assert_eq!((list(&process, &other).await.status, list(&process, &new).await.status), (200, 401));
     file.write(&[&lines_of_other, &lines_of_old, &lines_of_new]);
@@ -121,7 +121,7 @@ async fn events_count_among_the_requests_at_once_until_they_end() {
     let (one, lines_of_one) = key("one", "concurrent_requests = 1");
     let file = KeysFile::new("events", &[&lines_of_one]);
     let process = file.start();
-    let client = reqwest::Client::new();
+    let client = http_client();
     let asking = client.post(process.url("/v1/normals")).bearer_auth(&one).header("prefer", "respond-async");
     let job: serde_json::Value = asking.json(&slow_request()).send().await.unwrap().json().await.unwrap();
     let path = format!("/v1/jobs/{}", job["job_id"].as_str().unwrap());
@@ -152,7 +152,7 @@ async fn beyond_its_rate_a_key_is_told_when_to_come_back() {
     for _ in 0..20 {
         assert_eq!(list(&process, &fast).await.status, 200);
     }
-    let metrics = receive(reqwest::Client::new().get(process.url("/metrics"))).await;
+    let metrics = receive(http_client().get(process.url("/metrics"))).await;
     assert!(String::from_utf8_lossy(&metrics.bytes).contains("\ngramian_rate_limited_total 1\n"));
 }
 

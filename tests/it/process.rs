@@ -7,7 +7,7 @@ use std::thread::JoinHandle;
 
 use serde_json::{Value, json};
 
-use crate::support::{fibonacci_sphere, receive};
+use crate::support::{fibonacci_sphere, http_client, receive};
 
 /// A running binary on a free port, killed when dropped.
 pub struct Process {
@@ -103,7 +103,7 @@ impl Drop for Process {
 }
 
 pub async fn get(process: &Process, path: &str) -> (u16, Value) {
-    let answer = receive(reqwest::Client::new().get(process.url(path))).await;
+    let answer = receive(http_client().get(process.url(path))).await;
     (answer.status, answer.json().unwrap())
 }
 

@@ -81,7 +81,7 @@ impl Server {
             stopped.await.ok();
         };
         tokio::spawn(serve(App::new(config).await.unwrap(), listener, stop_signal));
-        Self { address, client: reqwest::Client::new(), _stop: stop }
+        Self { address, client: http_client(), _stop: stop }
     }
 
     pub fn url(&self, path: &str) -> String {
@@ -121,6 +121,12 @@ impl Server {
         let request = self.client.post(self.url(path)).header("content-type", "application/json");
         self.send(request.body(body)).await
     }
+}
+
+/// Returns a client. Those of `reqwest` need a cryptographic provider where they speak TLS.
+pub fn http_client() -> reqwest::Client {
+    gramian::server::install_provider();
+    reqwest::Client::new()
 }
 
 /// Sends a request, reads its answer to the end, and checks it against the OpenAPI document.

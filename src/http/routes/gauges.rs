@@ -1,11 +1,11 @@
 //! Metrics that are read at each scrape: the current state of the app, and counts that its parts keep.
 
 use prometheus::core::Collector;
-use prometheus::process_collector::ProcessCollector;
 use prometheus::proto::MetricFamily;
-use prometheus::{Error, IntCounterVec, IntGaugeVec, Opts, Registry};
+use prometheus::{Counter, Error, IntCounterVec, IntGaugeVec, Opts, Registry};
 
 use crate::http::state::app::App;
+use crate::process::Usage;
 use crate::store::Counts;
 use crate::store::objects::Verb;
 
@@ -21,11 +21,26 @@ pub fn gather(app: &App) -> Result<Vec<MetricFamily>, Error> {
         "version",
         &[(env!("CARGO_PKG_VERSION"), 1)],
     )?;
-    moment.0.register(Box::new(ProcessCollector::for_self()))?;
+    read_process(&moment)?;
     read_load(app, &moment)?;
     read_memory(app, &moment)?;
     read_store(app, &moment)?;
     Ok(moment.0.gather())
+}
+
+fn read_process(moment: &Moment) -> Result<(), Error> {
+    let Some(usage) = Usage::read() else { return Ok(()) };
+    let help = "Processor time of all threads, in seconds";
+    moment.add(Counter::new("process_cpu_seconds_total", help)?)?.inc_by(usage.cpu_seconds);
+    moment.gauge("process_open_fds", "Open files", usage.n_open_files)?;
+    if let Some(max_open_files) = usage.max_open_files {
+        moment.gauge("process_max_fds", "Most open files", max_open_files as usize)?;
+    }
+    let help = "Addresses in use, in bytes";
+    moment.gauge("process_virtual_memory_bytes", help, usage.virtual_bytes as usize)?;
+    moment.gauge("process_resident_memory_bytes", "Memory in use", usage.resident_bytes as usize)?;
+    moment.gauge("process_start_time_seconds", "Start, in seconds since 1970", usage.started as usize)?;
+    moment.gauge("process_threads", "Threads", usage.n_threads as usize)
 }
 
 fn read_load(app: &App, moment: &Moment) -> Result<(), Error> {

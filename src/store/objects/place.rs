@@ -9,6 +9,8 @@ use object_store::path::Path;
 use object_store::{ObjectStore, parse_url_opts};
 use url::Url;
 
+use crate::features::Feature;
+
 /// A directory, or `s3://bucket/prefix`, `gs://…`, `az://…`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Place {
@@ -27,6 +29,7 @@ impl FromStr for Place {
             _ if text.is_empty() => Err("is blank; unset it to keep everything in memory".to_owned()),
             None => Ok(Self::Directory(PathBuf::from(text))),
             Some((scheme, _)) if SCHEMES.contains(&scheme) => {
+                Feature::Buckets.require().map_err(|missing| missing.to_string())?;
                 let url = Url::parse(text).map_err(|error| format!("is no address: {error}"))?;
                 match url.host_str() {
                     Some(bucket) if !bucket.is_empty() => Ok(Self::Bucket(url)),
@@ -78,8 +81,15 @@ mod tests {
     fn directories_and_buckets_are_told_apart() {
         assert_eq!("/var/lib/gramian".parse(), Ok(Place::Directory("/var/lib/gramian".into())));
         assert_eq!("clouds".parse(), Ok(Place::Directory("clouds".into())));
+        let is_built_in = Feature::Buckets.is_present();
         for bucket in ["s3://bucket/some/prefix", "gs://bucket", "az://container/prefix"] {
-            assert!(matches!(bucket.parse(), Ok(Place::Bucket(url)) if url.as_str().starts_with(bucket)));
+            match bucket.parse() {
+                Ok(place) => {
+                    assert!(is_built_in);
+                    assert!(matches!(place, Place::Bucket(url) if url.as_str().starts_with(bucket)));
+                }
+                Err(error) => assert!(!is_built_in && error.contains("`buckets`"), "{error}"),
+            }
         }
         for bad in ["", " ", "s3://", "http://example.org", "file:///tmp"] {
             assert!(bad.parse::<Place>().is_err(), "{bad}");

@@ -140,7 +140,7 @@ async fn what_the_document_does_not_have_is_refused_as_such() {
     for path in BESIDE {
         assert!(is_beside(path));
     }
-    assert!(is_beside("/docs/swagger-ui.css"));
+    assert!(is_beside("/docs/vendor/swagger-ui.css"));
     for path in ["/docsy", "/v1", "/openapi.yaml", "//"] {
         assert!(!is_beside(path), "{path}");
     }

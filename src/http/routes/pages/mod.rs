@@ -1,7 +1,10 @@
-//! HTML pages for people: the page that shows clouds, and explanations of problems. No page needs a key.
+//! HTML pages for people: the page that shows clouds, the OpenAPI document in a browser, and explanations of
+//! problems. No page needs a key.
 //!
 //! Links are relative, so that they work behind a proxy that serves everything below a path prefix.
 
+pub mod documentation;
+mod site;
 pub mod viewer;
 
 use std::fmt::Write;

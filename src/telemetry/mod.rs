@@ -1,10 +1,12 @@
 //! Logs and traces. Logs are one JSON line per event on standard error. Spans of requests go to an
 //! OpenTelemetry collector, if there is one.
 
-use opentelemetry::{KeyValue, global};
-use opentelemetry_otlp::SpanExporter;
-use opentelemetry_sdk::Resource;
-use opentelemetry_sdk::trace::SdkTracerProvider;
+#[cfg(feature = "otlp")]
+mod spans;
+#[cfg(not(feature = "otlp"))]
+#[path = "no_spans.rs"]
+mod spans;
+
 use tracing::Level;
 use tracing_appender::non_blocking::{ErrorCounter, NonBlockingBuilder, WorkerGuard};
 use tracing_subscriber::filter::Targets;
@@ -18,9 +20,10 @@ const MAX_WAITING_LINES: usize = 4096;
 /// The log, written by a thread of its own. Dropping it writes the waiting lines. No request waits for a
 /// reader of the log: a line that finds the queue full is lost and counted.
 pub struct Log {
+    // Dropped in this order: the log has a line if the last spans could not be sent.
+    _spans: Option<spans::Export>,
     _writer: WorkerGuard,
     lost: ErrorCounter,
-    spans: Option<SdkTracerProvider>,
 }
 
 /// OpenTelemetry variables that name a collector. Others set headers (OTEL_EXPORTER_OTLP_HEADERS), sampling
@@ -39,39 +42,9 @@ pub fn start() -> Log {
     let (lines, writer) = builder.finish(std::io::stderr());
     let lost = lines.error_counter();
     tracing_subscriber::registry().with(fmt::layer().json().with_writer(lines)).with(filter).init();
-    Log { _writer: writer, lost, spans: send_spans() }
-}
-
-/// Starts sending spans to the collector that the environment names, if any: OTLP over HTTP, in batches. No
-/// request waits for it.
-fn send_spans() -> Option<SdkTracerProvider> {
-    COLLECTORS.iter().find(|name| std::env::var_os(name).is_some_and(|value| !value.is_empty()))?;
-    let exporter = match SpanExporter::builder().with_http().build() {
-        Ok(exporter) => exporter,
-        Err(error) => {
-            tracing::error!(%error, "spans could not be sent");
-            return None;
-        }
-    };
-    let name = std::env::var("OTEL_SERVICE_NAME").unwrap_or_else(|_| env!("CARGO_PKG_NAME").to_owned());
-    let resource = Resource::builder().with_service_name(name);
-    let version = KeyValue::new("service.version", env!("CARGO_PKG_VERSION"));
-    let provider = SdkTracerProvider::builder()
-        .with_resource(resource.with_attribute(version).build())
-        .with_batch_exporter(exporter)
-        .build();
-    global::set_tracer_provider(provider.clone());
-    tracing::info!("spans are sent");
-    Some(provider)
-}
-
-impl Drop for Log {
-    /// Sends the remaining spans.
-    fn drop(&mut self) {
-        if let Some(Err(error)) = self.spans.take().map(|spans| spans.shutdown()) {
-            tracing::warn!(%error, "the last spans could not be sent");
-        }
-    }
+    let names_collector = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    let spans = COLLECTORS.into_iter().any(names_collector).then(spans::start).flatten();
+    Log { _spans: spans, _writer: writer, lost }
 }
 
 impl Log {
