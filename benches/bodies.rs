@@ -110,7 +110,7 @@ fn plain_server(matrix: Vec<f64>) -> SocketAddr {
 struct Matrix(Vec<f64>);
 
 impl Answer for Matrix {
-    fn into_parts(self) -> Result<Parts, Problem> {
+    fn into_parts(self: Box<Self>) -> Result<Parts, Problem> {
         let mut parts = Parts::default();
         Array::new(self.0, &[MATRIX_ROWS, MATRIX_ROWS]).add_to("matrix", &mut parts)?;
         Ok(parts)
@@ -137,7 +137,7 @@ fn service(matrix: Vec<f64>) -> SocketAddr {
             let wanted = Wanted { format: Format::Npy, coding: Coding::Identity };
             let memory =
                 app.prepared.reserve(Owner(0), 2 * size_of_val(&*matrix), || true).await.unwrap().unwrap();
-            let encode = move || Encoded::of(Matrix(matrix), wanted);
+            let encode = move || Encoded::of(Box::new(Matrix(matrix)), wanted);
             let encoded = app.compute.run_small(Owner(0), encode).await;
             encoded.ok().unwrap().ok().unwrap().into_response(&app.compute, memory)
         }

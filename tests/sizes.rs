@@ -184,7 +184,7 @@ fn seeds_take_what_they_are_priced() {
 struct Numbers(Array);
 
 impl Answer for Numbers {
-    fn into_parts(self) -> Result<Parts, Problem> {
+    fn into_parts(self: Box<Self>) -> Result<Parts, Problem> {
         let mut parts = Parts::default();
         self.0.add_to("principal_directions", &mut parts)?;
         Ok(parts)
@@ -239,7 +239,7 @@ async fn clouds_come_in_and_answers_go_out_within_three_times_their_arrays() {
         let before = ALLOCATOR.current_usage();
         ALLOCATOR.reset_peak_usage();
         let answer = Numbers(Array::new(numbers(20 * N), &[N, 20]));
-        let encoded = Encoded::of(answer, Wanted { format, coding }).ok().unwrap();
+        let encoded = Encoded::of(Box::new(answer), Wanted { format, coding }).ok().unwrap();
         let memory = budget.try_reserve(OWNER, encoded.n_bytes()).unwrap();
         let n_sent = read(encoded.into_response(&compute, memory)).await;
         let ratio = |n: usize| n as f64 / one as f64;

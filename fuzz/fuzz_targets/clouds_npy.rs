@@ -2,10 +2,10 @@
 
 #![no_main]
 
-use gramian::http::reading::read_as;
+use gramian::http::reading::read_cloud;
 use gramian::http::wire::negotiation::{BodyFormat, Coding};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
-    let _ = read_as("create_cloud", BodyFormat::Npy, Coding::Identity, data);
+    let _ = read_cloud(BodyFormat::Npy, Coding::Identity, data);
 });

@@ -2,12 +2,12 @@
 
 #![no_main]
 
-use gramian::http::reading::read_as;
+use gramian::http::reading::read_cloud;
 use gramian::http::wire::negotiation::{BodyFormat, Coding};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
     let Some((&first, body)) = data.split_first() else { return };
     let coding = if first % 2 == 0 { Coding::Gzip } else { Coding::Zstd };
-    let _ = read_as("create_cloud", BodyFormat::Json, coding, body);
+    let _ = read_cloud(BodyFormat::Json, coding, body);
 });

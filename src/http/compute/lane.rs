@@ -13,6 +13,18 @@ use super::pulse::Pulse;
 use super::turns::{FairSemaphore, Turn};
 use crate::store::Owner;
 
+/// A job for the threads. Boxed, so that code for running one exists once, whatever the job and its result.
+pub(super) type Job = Box<dyn FnOnce(&JobObserver) + Send>;
+
+/// Boxes a job, which sends its result before it ends.
+pub(super) fn boxed<T: Send + 'static>(
+    job: impl FnOnce(&JobObserver) -> T + Send + 'static,
+) -> (Job, oneshot::Receiver<T>) {
+    let (sender, receiver) = oneshot::channel();
+    // Sending fails if the client has left.
+    (Box::new(move |observer| _ = sender.send(job(observer))), receiver)
+}
+
 /// A thread pool with turns.
 pub(super) struct Lane {
     pool: Arc<rayon::ThreadPool>,
@@ -50,15 +62,15 @@ impl Lane {
         self.turns.take(owner).await
     }
 
-    /// Runs a job to its end in a turn. `None` if it panicked.
+    /// Runs a job to its end in a turn, and returns the durations of its stages. `None` if it panicked.
     ///
     /// Dropping the future tells the job to stop at its next checkpoint. The job keeps its turn until then.
-    pub(super) async fn run<T: Send + 'static>(
+    pub(super) async fn run(
         &self,
         turn: Turn,
         progress: Option<Arc<Progress>>,
-        job: impl FnOnce(&JobObserver) -> T + Send + 'static,
-    ) -> Option<(T, StageTimes)> {
+        job: Job,
+    ) -> Option<StageTimes> {
         let (sender, receiver) = oneshot::channel();
         let cancelled = Arc::new(AtomicBool::new(false));
         let _cancel_on_drop = CancelOnDrop(cancelled.clone());
@@ -69,7 +81,7 @@ impl Lane {
             let outcome = catch_unwind(AssertUnwindSafe(|| job(&observer)));
             drop(turn);
             // Sending fails if the client has left.
-            let _ = sender.send(outcome.map(|result| (result, observer.times())));
+            let _ = sender.send(outcome.map(|()| observer.times()));
         });
         receiver.await.ok()?.ok()
     }
@@ -139,6 +151,16 @@ mod tests {
     }
 
     #[tokio::test]
+    async fn a_turn_is_free_once_its_result_is_there() {
+        let lane = Lane::new("lane", 1, FairSemaphore::new(1), 0).unwrap();
+        let (job, result) = boxed(|_| 7);
+        let turn = lane.turn(Owner(0)).await;
+        assert_eq!(lane.load(), (1, 0));
+        assert!(lane.run(turn, None, job).await.is_some());
+        assert_eq!((lane.load(), result.await), ((0, 0), Ok(7)));
+    }
+
+    #[tokio::test]
     async fn a_lane_that_works_is_moving_however_long_the_work() {
         let lane = Lane::new("lane", 1, FairSemaphore::new(1), 0).unwrap();
         let (done, is_done) = std::sync::mpsc::channel::<()>();
@@ -149,7 +171,7 @@ mod tests {
             }
         };
         let turn = lane.turn(Owner(0)).await;
-        let mut running = Box::pin(lane.run(turn, None, work));
+        let mut running = Box::pin(lane.run(turn, None, boxed(work).0));
         assert!(futures_util::poll!(&mut running).is_pending());
         for _ in 0..3 {
             assert!(lane.is_moving(Duration::from_secs(5)).await);

@@ -38,7 +38,7 @@ use super::problem::Problem;
 use crate::store::Owner;
 use calibration::Calibration;
 pub use calibration::Work;
-use lane::Lane;
+use lane::{Job, Lane, boxed};
 pub use observer::{JobObserver, StageTimes};
 pub use places::Admission;
 use places::Places;
@@ -167,15 +167,21 @@ impl Compute {
         flops: f64,
         job: impl FnOnce(&JobObserver) -> T + Send + 'static,
     ) -> Result<(T, StageTimes), Problem> {
+        let (job, result) = boxed(job);
+        let times = self.run_job(admission, flops, job).await?;
+        Ok((result.await.map_err(|_| panicked())?, times))
+    }
+
+    async fn run_job(&self, admission: &Admission, flops: f64, job: Job) -> Result<StageTimes, Problem> {
         let lane = self.lane(flops, admission.is_job());
         let turn = lane.turn(admission.owner).await;
         admission.begin();
-        let done = lane.run(turn, admission.progress.clone(), job).await.ok_or_else(panicked)?;
-        admission.worked(done.1.whole);
-        if done.1.ended_early {
+        let times = lane.run(turn, admission.progress.clone(), job).await.ok_or_else(panicked)?;
+        admission.worked(times.whole);
+        if times.ended_early {
             admission.forget_work();
         }
-        Ok(done)
+        Ok(times)
     }
 
     /// Whether nothing runs or waits on the lane for work of so many flops.
@@ -196,10 +202,15 @@ impl Compute {
         flops: f64,
         job: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, Problem> {
+        let (job, result) = boxed(|_| job());
+        self.run_job_without_place(owner, flops, job).await?;
+        result.await.map_err(|_| panicked())
+    }
+
+    async fn run_job_without_place(&self, owner: Owner, flops: f64, job: Job) -> Result<(), Problem> {
         let lane = self.lane(flops, false);
         let turn = lane.turn(owner).await;
-        let (result, _) = lane.run(turn, None, |_| job()).await.ok_or_else(panicked)?;
-        Ok(result)
+        lane.run(turn, None, job).await.map(drop).ok_or_else(panicked)
     }
 
     /// Runs a small job without a place ([`Compute::run_without_place`]).

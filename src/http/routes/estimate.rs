@@ -22,15 +22,14 @@ use super::tiles::regions::RegionsRequest;
 use super::values::interpolation::{InterpolationBatchRequest, InterpolationRequest};
 use super::values::model_selection::ModelSelectionRequest;
 use super::values::posterior::{PosteriorBatchRequest, PosteriorRequest};
-use crate::http::compute::{Admission, JobObserver};
+use crate::http::compute::JobObserver;
 use crate::http::fields::SolverUsed;
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
-use crate::http::routes::clouds::CloudRequest;
 use crate::http::serve::intake::{ReceivedBody, read_body};
-use crate::http::serve::operation::{self, Declared, REQUEST_FORMATS};
+use crate::http::serve::operation::{AnyOperation, REQUEST_FORMATS};
+use crate::http::serve::steps::{self, Estimate};
 use crate::http::state::app::App;
-use crate::http::wire::read::body::UnpackedBody;
 use crate::http::wire::read::limits::ParseContext;
 use crate::http::wire::write::json::Json;
 use crate::store::Owner;
@@ -67,7 +66,7 @@ impl PartialSchema for OperationName {
     fn schema() -> RefOr<Schema> {
         let text = "An operation that computes, by its `operationId`.";
         let names = ObjectBuilder::new().schema_type(SchemaType::Type(Type::String));
-        names.enum_values(Some(NAMES.iter().copied())).description(Some(text)).into()
+        names.enum_values(Some(OPERATIONS.map(|operation| operation.name))).description(Some(text)).into()
     }
 }
 
@@ -120,7 +119,16 @@ pub async fn estimate(
     let (shared, flops) = (app.clone(), intake.body.flops_to_parse());
     let named = move |observer: &JobObserver| name_of(intake, &shared, observer);
     let (operation, intake) = app.compute.run(&admission, flops, named).await?.0?;
-    estimate_of(&operation, &app, &admission, intake).await
+    let operation = find(&operation).ok_or_else(unknown)?;
+    let estimate = steps::estimate(app, admission, intake, operation).await?;
+    Ok(EstimateResponse::of(operation.name, estimate))
+}
+
+/// 422 for a name that is no operation's.
+fn unknown() -> Problem {
+    let names = OPERATIONS.map(|operation| operation.name).join(", ");
+    let detail = format!("no operation of this name can be estimated; there are {names}");
+    Problem::invalid_request("/operation", detail)
 }
 
 /// A request of any operation, whose members are skipped.
@@ -140,60 +148,32 @@ fn name_of(
     Ok((operation, ReceivedBody { body: body.into_request(app.memory.body), memory }))
 }
 
-macro_rules! operations {
-    ($($request:ty),* $(,)?) => {
-        /// Names of all operations that can be estimated.
-        pub const NAMES: &[&str] = &[$(<$request as Declared>::NAME),*];
+/// All operations that can be estimated.
+pub const OPERATIONS: [AnyOperation; 15] = [
+    AnyOperation::of::<InterpolationRequest>(),
+    AnyOperation::of::<InterpolationBatchRequest>(),
+    AnyOperation::of::<PosteriorRequest>(),
+    AnyOperation::of::<PosteriorBatchRequest>(),
+    AnyOperation::of::<ModelSelectionRequest>(),
+    AnyOperation::of::<NormalsRequest>(),
+    AnyOperation::of::<CurvaturesRequest>(),
+    AnyOperation::of::<LevelSetRequest>(),
+    AnyOperation::of::<SurfaceGradientRequest>(),
+    AnyOperation::of::<SurfaceGradientMatrixRequest>(),
+    AnyOperation::of::<SurfaceGradientSparseMatrixRequest>(),
+    AnyOperation::of::<LaplaceBeltramiRequest>(),
+    AnyOperation::of::<LaplaceBeltramiMatrixRequest>(),
+    AnyOperation::of::<LaplaceBeltramiSparseMatrixRequest>(),
+    AnyOperation::of::<RegionsRequest>(),
+];
 
-        async fn estimate_of(
-            operation: &str,
-            app: &Arc<App>,
-            admission: &Arc<Admission>,
-            intake: ReceivedBody,
-        ) -> Result<Json<EstimateResponse>, Problem> {
-            $(if operation == <$request as Declared>::NAME {
-                let estimate = operation::estimate::<$request>(app, admission, intake).await?;
-                return Ok(EstimateResponse::of(<$request as Declared>::NAME, estimate));
-            })*
-            let detail = format!("no operation of this name can be estimated; there are {}", NAMES.join(", "));
-            Err(Problem::invalid_request("/operation", detail))
-        }
-
-        /// Parses a body as a request of an operation, and drops the request. Any name outside [`NAMES`]
-        /// means the registration of a cloud.
-        ///
-        /// # Errors
-        /// Returns the problem that the request would be refused with.
-        pub fn read_as(operation: &str, body: &UnpackedBody, context: &ParseContext<'_>) -> Result<(), Problem> {
-            $(if operation == <$request as Declared>::NAME {
-                return body.parse::<$request>(context).map(drop);
-            })*
-            body.parse::<CloudRequest>(context).map(drop)
-        }
-    };
+fn find(name: &str) -> Option<AnyOperation> {
+    OPERATIONS.into_iter().find(|operation| operation.name == name)
 }
 
-operations!(
-    InterpolationRequest,
-    InterpolationBatchRequest,
-    PosteriorRequest,
-    PosteriorBatchRequest,
-    ModelSelectionRequest,
-    NormalsRequest,
-    CurvaturesRequest,
-    LevelSetRequest,
-    SurfaceGradientRequest,
-    SurfaceGradientMatrixRequest,
-    SurfaceGradientSparseMatrixRequest,
-    LaplaceBeltramiRequest,
-    LaplaceBeltramiMatrixRequest,
-    LaplaceBeltramiSparseMatrixRequest,
-    RegionsRequest,
-);
-
 impl EstimateResponse {
-    fn of(operation: &'static str, estimate: operation::Estimate) -> Json<Self> {
-        let operation::Estimate { solver, outlook, seconds, is_admissible } = estimate;
+    fn of(operation: &'static str, estimate: Estimate) -> Json<Self> {
+        let Estimate { solver, outlook, seconds, is_admissible } = estimate;
         Json(Self {
             operation,
             solver: solver.into(),

@@ -27,7 +27,8 @@ macro_rules! operation {
             axum::Extension(owner): axum::Extension<$crate::store::Owner>,
             request: axum::extract::Request,
         ) -> Result<axum::response::Response, $crate::http::problem::Problem> {
-            $crate::http::serve::operation::serve::<$request>(app, owner, request).await
+            let operation = $crate::http::serve::operation::AnyOperation::of::<$request>();
+            $crate::http::serve::steps::serve(app, owner, request, operation).await
         }
 
         impl $crate::http::serve::operation::Declared for $request {

@@ -1,14 +1,13 @@
 //! Parsing of request bodies without a service, for the fuzz targets in `fuzz/`.
 
-use super::estimate;
+use super::clouds::CloudRequest;
+pub use super::estimate::OPERATIONS;
 use crate::http::problem::Problem;
+use crate::http::serve::operation::AnyOperation;
 use crate::http::wire::negotiation::{BodyFormat, Coding};
-use crate::http::wire::read::body::RequestBody;
+use crate::http::wire::read::body::{RequestBody, UnpackedBody};
 use crate::http::wire::read::limits::ParseContext;
 use gramian_numerics::observer::Unobserved;
-
-/// Names of the operations that compute. Any other name means the registration of a cloud.
-pub const OPERATIONS: &[&str] = estimate::NAMES;
 
 /// Largest size of an unpacked body, bytes.
 const LIMIT: usize = 1 << 22;
@@ -20,7 +19,23 @@ const CONTEXT: ParseContext<'static> =
 ///
 /// # Errors
 /// Returns the problem that the request would be refused with.
-pub fn read_as(operation: &str, format: BodyFormat, coding: Coding, bytes: &[u8]) -> Result<(), Problem> {
-    let body = RequestBody::new(format, coding, bytes.to_vec(), LIMIT).unpack(&CONTEXT, |_| Ok(()))?;
-    estimate::read_as(operation, &body, &CONTEXT)
+pub fn read_as(
+    operation: AnyOperation,
+    format: BodyFormat,
+    coding: Coding,
+    bytes: &[u8],
+) -> Result<(), Problem> {
+    (operation.parse)(&unpacked(format, coding, bytes)?, &CONTEXT).map(drop)
+}
+
+/// Parses a body as the registration of a cloud, and drops the request.
+///
+/// # Errors
+/// Returns the problem that the request would be refused with.
+pub fn read_cloud(format: BodyFormat, coding: Coding, bytes: &[u8]) -> Result<(), Problem> {
+    unpacked(format, coding, bytes)?.parse::<CloudRequest>(&CONTEXT).map(drop)
+}
+
+fn unpacked(format: BodyFormat, coding: Coding, bytes: &[u8]) -> Result<UnpackedBody, Problem> {
+    RequestBody::new(format, coding, bytes.to_vec(), LIMIT).unpack(&CONTEXT, |_| Ok(()))
 }

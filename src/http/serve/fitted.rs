@@ -22,22 +22,22 @@ use gramian_numerics::surface::Surface;
 pub struct Fits {
     pub app: Arc<App>,
     /// Fit of the values, or of the surface where there are no values.
-    pub main: Fitted,
+    pub main: FitModel,
     /// Fit of the surface, where it differs from the main fit.
-    pub surface: Option<Fitted>,
+    pub surface: Option<FitModel>,
     /// The surface, for operations that need one.
     pub made: Option<Arc<Surface>>,
 }
 
 /// A fit with its model.
-pub struct Fitted {
+pub struct FitModel {
     pub plan: FitPlan,
     pub stored: Arc<PreparedFit>,
 }
 
 impl Fits {
     /// Returns the fit of the surface.
-    pub fn surface(&self) -> &Fitted {
+    pub fn surface(&self) -> &FitModel {
         self.surface.as_ref().unwrap_or(&self.main)
     }
 
@@ -126,7 +126,7 @@ impl Fits {
     }
 }
 
-impl Fitted {
+impl FitModel {
     pub fn model(&self) -> &Model {
         self.stored.model()
     }

@@ -3,8 +3,8 @@
 use std::sync::{Arc, OnceLock};
 
 use super::durable::factors;
-use super::fitted::{Fits, Fitted};
-use super::plan::{Cost, FitPlan};
+use super::fitted::{FitModel, Fits};
+use super::plan::{Cost, FitPlan, FitPlans};
 use super::report::AnswerHeaders;
 use super::sampling::find_sampling;
 use crate::http::compute::{Admission, JobObserver, StageTimes, Work};
@@ -27,8 +27,7 @@ const LEAST_BYTES: usize = 16 << 10;
 pub struct Fitting<'a> {
     pub app: &'a Arc<App>,
     pub admission: &'a Arc<Admission>,
-    /// Whether the operation needs the surface as well.
-    pub has_surface: bool,
+    pub plans: &'a FitPlans,
 }
 
 /// Memory of a request, reserved all at once. Waiting for a part while holding another could deadlock.
@@ -44,16 +43,10 @@ impl Fitting<'_> {
     ///
     /// # Errors
     /// 413 if the request takes more memory than there is, and the refusals of the factorization.
-    pub async fn fits(
-        &self,
-        main: &FitPlan,
-        surface: Option<&FitPlan>,
-        cost: Cost,
-        report: &mut AnswerHeaders,
-    ) -> Result<(Fits, Reservation), Problem> {
-        let mut wanted = Wanted::of(main, surface, cost);
+    pub async fn fits(&self, report: &mut AnswerHeaders) -> Result<(Fits, Reservation), Problem> {
+        let mut extents = Extents { main: Extent::Expected, other: Extent::Expected };
         loop {
-            if let Some(found) = self.attempt(&mut wanted, report).await? {
+            if let Some(found) = self.attempt(&mut extents, report).await? {
                 return Ok(found);
             }
             // Other tasks get their turn, however often this repeats.
@@ -62,30 +55,23 @@ impl Fitting<'_> {
     }
 
     /// Returns the fits without waiting, if nothing is missing and memory for the work is free.
-    pub fn at_hand(
-        &self,
-        main: &FitPlan,
-        surface: Option<&FitPlan>,
-        cost: Cost,
-        report: &mut AnswerHeaders,
-    ) -> Option<(Fits, Reservation)> {
+    pub fn at_hand(&self, report: &mut AnswerHeaders) -> Option<(Fits, Reservation)> {
         let find = |plan: &FitPlan| {
             let stored = self.app.prepared.get(plan.key)?;
-            Some(Fitted { plan: plan.clone(), stored })
+            Some(FitModel { plan: plan.clone(), stored })
         };
-        let main = find(main)?;
-        let other = surface.filter(|surface| surface.key != main.plan.key);
-        let surface = match other {
+        let main = find(&self.plans.main)?;
+        let surface = match self.plans.other() {
             Some(other) => Some(find(other)?),
             None => None,
         };
         let mut fits = Fits { app: self.app.clone(), main, surface, made: None };
-        if self.has_surface {
+        if self.plans.has_surface {
             fits.made = Some(fits.surface().stored.surface()?);
         }
-        let memory = self.app.prepared.try_reserve(self.admission.owner, n_bytes_of_work(cost))?;
-        for fitted in [Some(&fits.main), fits.surface.as_ref()].into_iter().flatten() {
-            report.found(&fitted.stored, CacheOutcome::Hit);
+        let memory = self.app.prepared.try_reserve(self.admission.owner, n_bytes_of_work(self.plans.cost))?;
+        for fit in [Some(&fits.main), fits.surface.as_ref()].into_iter().flatten() {
+            report.found(&fit.stored, CacheOutcome::Hit);
         }
         Some((fits, memory))
     }
@@ -96,20 +82,20 @@ impl Fitting<'_> {
     /// Then all memory goes back and is counted again.
     async fn attempt(
         &self,
-        wanted: &mut Wanted<'_>,
+        extents: &mut Extents,
         report: &mut AnswerHeaders,
     ) -> Result<Option<(Fits, Reservation)>, Problem> {
-        let Some(memory) = self.reserve(wanted).await? else { return Ok(None) };
-        let fitted = self.fitted(wanted.main, memory.main, &mut wanted.of_main, report).await?;
+        let Some(memory) = self.reserve(*extents).await? else { return Ok(None) };
+        let fitted = self.fitted(&self.plans.main, memory.main, &mut extents.main, report).await?;
         let Some(main) = fitted else { return Ok(None) };
         let mut fits = Fits { app: self.app.clone(), main, surface: None, made: None };
-        if let Some(other) = wanted.other {
-            fits.surface = self.fitted(other, memory.other, &mut wanted.of_other, report).await?;
+        if let Some(other) = self.plans.other() {
+            fits.surface = self.fitted(other, memory.other, &mut extents.other, report).await?;
             if fits.surface.is_none() {
                 return Ok(None);
             }
         }
-        if self.has_surface {
+        if self.plans.has_surface {
             fits.made = self.surface(fits.surface(), memory.surface, report).await?;
             if fits.made.is_none() {
                 return Ok(None);
@@ -119,11 +105,11 @@ impl Fitting<'_> {
     }
 
     /// Reserves the memory of the request. Returns `None` if the missing parts changed during the wait.
-    async fn reserve(&self, wanted: &Wanted<'_>) -> Result<Option<Memory>, Problem> {
-        let counted = self.count(wanted);
-        let work = n_bytes_of_work(wanted.cost);
+    async fn reserve(&self, extents: Extents) -> Result<Option<Memory>, Problem> {
+        let counted = self.count(extents);
+        let work = n_bytes_of_work(self.plans.cost);
         let total = counted.into_iter().fold(work, usize::saturating_add);
-        let is_wanted = || self.count(wanted) == counted;
+        let is_wanted = || self.count(extents) == counted;
         let reserved = self.app.reserve(self.admission.owner, total, is_wanted).await?;
         let Some(mut work) = reserved else { return Ok(None) };
         let [main, other, surface] = counted.map(|n_bytes| (n_bytes > 0).then(|| work.split(n_bytes)));
@@ -131,21 +117,21 @@ impl Fitting<'_> {
     }
 
     /// Returns what is missing now of the model and surface of each fit, with the price of making it.
-    fn missing<'w>(&self, wanted: &Wanted<'w>) -> impl Iterator<Item = (Missing, MakingPrice, Extent)> {
-        let fits = [(Some(wanted.main), wanted.of_main), (wanted.other, wanted.of_other)];
+    fn missing(&self) -> impl Iterator<Item = (Missing, MakingPrice)> {
+        let (main, other) = (&self.plans.main, self.plans.other());
         // The last fit is the one of the surface.
-        let of_surface = wanted.other.unwrap_or(wanted.main).key;
-        fits.into_iter().filter_map(move |(plan, extent)| {
-            let plan = plan?;
-            let with_surface = self.has_surface && plan.key == of_surface;
-            Some((self.app.prepared.missing(plan.key, with_surface), plan.price(), extent))
+        let of_surface = other.unwrap_or(main).key;
+        [Some(main), other].into_iter().flatten().map(move |plan| {
+            let with_surface = self.plans.has_surface && plan.key == of_surface;
+            (self.app.prepared.missing(plan.key, with_surface), plan.price())
         })
     }
 
     /// Counts the bytes of the models and the surface that are missing now.
-    fn count(&self, wanted: &Wanted<'_>) -> [usize; 3] {
+    fn count(&self, extents: Extents) -> [usize; 3] {
         let mut counted = [0; 3];
-        for (at, (missing, price, extent)) in self.missing(wanted).enumerate() {
+        let extents = [extents.main, extents.other];
+        for (at, ((missing, price), extent)) in self.missing().zip(extents).enumerate() {
             if missing.solver {
                 counted[at] = match extent {
                     Extent::Expected => price.expected.n_bytes,
@@ -160,10 +146,10 @@ impl Fitting<'_> {
     }
 
     /// Returns the work and memory of a request, as far as they can be foreseen.
-    pub fn outlook(&self, main: &FitPlan, surface: Option<&FitPlan>, cost: Cost) -> Outlook {
-        let wanted = Wanted::of(main, surface, cost);
+    pub fn outlook(&self) -> Outlook {
+        let cost = self.plans.cost;
         let mut outlook = Outlook { flops: cost.flops(), n_bytes: n_bytes_of_work(cost), is_cached: true };
-        for (missing, price, _) in self.missing(&wanted) {
+        for (missing, price) in self.missing() {
             let parts = [(missing.solver, price.expected), (missing.surface, price.surface)];
             for (_, price) in parts.into_iter().filter(|(is_missing, _)| *is_missing) {
                 outlook.flops += price.flops;
@@ -184,7 +170,7 @@ impl Fitting<'_> {
         memory: Option<Reservation>,
         extent: &mut Extent,
         report: &mut AnswerHeaders,
-    ) -> Result<Option<Fitted>, Problem> {
+    ) -> Result<Option<FitModel>, Problem> {
         let begin =
             |memory: Reservation| prepare(self.app.clone(), self.admission.clone(), plan.clone(), memory);
         match self.app.prepared.get_or_prepare(plan.key, memory, begin).await {
@@ -200,7 +186,7 @@ impl Fitting<'_> {
                     self.admission.forget_work();
                 }
                 report.found(&stored, outcome);
-                Ok(Some(Fitted { plan: plan.clone(), stored }))
+                Ok(Some(FitModel { plan: plan.clone(), stored }))
             }
             Ok(None) => Ok(None),
             Err(FitFailure::NeedsAll) => {
@@ -214,41 +200,24 @@ impl Fitting<'_> {
     /// Finds or makes a surface. Returns `None` if it has to be made and there is no memory for it.
     async fn surface(
         &self,
-        fitted: &Fitted,
+        fit: &FitModel,
         memory: Option<Reservation>,
         report: &mut AnswerHeaders,
     ) -> Result<Option<Arc<Surface>>, Problem> {
         let fits = &self.app.prepared;
-        let (key, times) = (fitted.plan.key, Arc::new(OnceLock::new()));
+        let (key, times) = (fit.plan.key, Arc::new(OnceLock::new()));
         let was_missing = memory.is_some();
         let begin = |memory: Reservation| {
-            make_surface(self.app.clone(), self.admission.clone(), fitted, times.clone(), memory)
+            make_surface(self.app.clone(), self.admission.clone(), fit, times.clone(), memory)
         };
-        let found = fits.get_or_make_surface(key, &fitted.stored, memory, begin).await;
+        let found = fits.get_or_make_surface(key, &fit.stored, memory, begin).await;
         match times.get() {
             Some(&times) => report.made_surface(times),
             // Another request made it.
             None if was_missing => self.admission.forget_work(),
             None => {}
         }
-        found.map_err(|failure| fitted.plan.failed(failure))
-    }
-}
-
-/// The fits that one request needs, and the extent of memory for each.
-struct Wanted<'a> {
-    main: &'a FitPlan,
-    /// Fit of the surface, where it differs from the main fit.
-    other: Option<&'a FitPlan>,
-    of_main: Extent,
-    of_other: Extent,
-    cost: Cost,
-}
-
-impl<'a> Wanted<'a> {
-    fn of(main: &'a FitPlan, surface: Option<&'a FitPlan>, cost: Cost) -> Self {
-        let other = surface.filter(|surface| surface.key != main.key);
-        Self { main, other, of_main: Extent::Expected, of_other: Extent::Expected, cost }
+        found.map_err(|failure| fit.plan.failed(failure))
     }
 }
 
@@ -276,6 +245,13 @@ enum Extent {
     Expected,
     /// All that the model may need, from the start, because it is known to need it.
     AtMost,
+}
+
+/// Amounts of memory reserved for the models of one request.
+#[derive(Clone, Copy)]
+struct Extents {
+    main: Extent,
+    other: Extent,
 }
 
 fn n_bytes_of_work(cost: Cost) -> usize {
@@ -348,11 +324,11 @@ async fn sampling_unless_merged(
 fn make_surface(
     app: Arc<App>,
     admission: Arc<Admission>,
-    fitted: &Fitted,
+    fit: &FitModel,
     times: Arc<OnceLock<StageTimes>>,
     memory: Reservation,
 ) -> impl Future<Output = Result<(Surface, Reservation), FitFailure>> + Send + 'static {
-    let (plan, stored) = (fitted.plan.clone(), fitted.stored.clone());
+    let (plan, stored) = (fit.plan.clone(), fit.stored.clone());
     let flops = plan.price().surface.flops;
     async move {
         let sampling = sampling_unless_merged(&app, &admission, &plan).await?;

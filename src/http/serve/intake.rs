@@ -15,7 +15,6 @@ use crate::http::wire::compression::SMALLER_BODY;
 use crate::http::wire::negotiation::{BodyFormat, announced};
 use crate::http::wire::read::body::{RequestBody, UnpackedBody};
 use crate::http::wire::read::limits::ParseContext;
-use crate::http::wire::read::parse::WithOperation;
 use crate::store::Owner;
 use crate::store::budget::Reservation;
 use gramian_numerics::observer::Observer;
@@ -50,20 +49,6 @@ impl ReceivedBody {
     ) -> Result<(T, Reservation), Problem> {
         let (body, memory) = self.unpack(app, observer)?;
         Ok((body.parse(&ParseContext::new(&app.config, observer))?, memory))
-    }
-
-    /// Parses a body that may have a member `operation` beside those of the request. Returns the result with
-    /// the memory that it holds.
-    ///
-    /// # Errors
-    /// Returns the errors of [`ReceivedBody::parse`].
-    pub fn parse_with_operation<T: DeserializeOwned>(
-        self,
-        app: &App,
-        observer: &dyn Observer,
-    ) -> Result<(WithOperation<T>, Reservation), Problem> {
-        let (body, memory) = self.unpack(app, observer)?;
-        Ok((body.parse_with_operation(&ParseContext::new(&app.config, observer))?, memory))
     }
 
     /// Unpacks the body. Returns it with the memory that it holds.

@@ -1,10 +1,11 @@
 //! The way of a request from its body to its answer, the same for every operation.
 
+pub mod operation;
+pub mod steps;
+
 pub mod answers;
 pub mod direct;
 pub mod durable;
-
-pub mod operation;
 
 pub mod fitted;
 pub mod fitting;

@@ -9,9 +9,10 @@ use clap::Parser;
 use http_body_util::BodyExt;
 use serde_json::{Value, json};
 
-use super::operation::{estimate, serve};
+use super::operation::AnyOperation;
 use super::plan::Lack;
 use super::planner::{GivenValues, Planner};
+use super::steps::{estimate, serve};
 use crate::config::Config;
 use crate::http::fields::{CloudRef, Fit, SolverChoice};
 use crate::http::problem::Problem;
@@ -59,7 +60,7 @@ fn interpolation(n: usize) -> Value {
 }
 
 async fn interpolated(app: &Arc<App>, body: &Value) -> Result<Response, Problem> {
-    serve::<InterpolationRequest>(app.clone(), OWNER, request(body)).await
+    serve(app.clone(), OWNER, request(body), AnyOperation::of::<InterpolationRequest>()).await
 }
 
 fn outcome(response: &Response) -> CacheOutcome {
@@ -172,7 +173,7 @@ async fn an_estimate_computes_nothing_and_sees_what_is_there() {
         let (parts, body) = request(body).into_parts();
         let intake = read_body(&app, OWNER, &parts.headers, body, &REQUEST_FORMATS).await.unwrap();
         let admission = app.compute.admit(OWNER).unwrap();
-        estimate::<InterpolationRequest>(&app, &admission, intake).await.unwrap()
+        estimate(app.clone(), admission, intake, AnyOperation::of::<InterpolationRequest>()).await.unwrap()
     };
     body["operation"] = json!("compute_interpolation");
     let before = estimated(&body).await;
@@ -189,13 +190,14 @@ async fn clouds_that_only_the_store_has_are_read_from_it() {
     let place = folder.to_str().unwrap();
     let body = json!({"cloud": {"points": circle(64)}, "alpha": 0.01});
     let first = app(&["--store", place]).await;
-    let answer = serve::<NormalsRequest>(first, OWNER, request(&body)).await.unwrap();
+    let normals = AnyOperation::of::<NormalsRequest>();
+    let answer = serve(first, OWNER, request(&body), normals).await.unwrap();
     let id = answer.headers()["gramian-cloud"].to_str().unwrap().to_owned();
     let body = json!({"cloud": {"id": id}, "alpha": 0.01});
     let second = app(&["--store", place]).await;
-    serve::<NormalsRequest>(second, OWNER, request(&body)).await.unwrap();
+    serve(second, OWNER, request(&body), normals).await.unwrap();
     let stranger = app(&[]).await;
-    let problem = serve::<NormalsRequest>(stranger, OWNER, request(&body)).await.err().unwrap();
+    let problem = serve(stranger, OWNER, request(&body), normals).await.err().unwrap();
     assert_eq!(problem.slug(), Slug::UnknownCloud);
     std::fs::remove_dir_all(folder).unwrap();
 }

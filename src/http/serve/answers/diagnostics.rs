@@ -3,7 +3,7 @@
 use crate::http::fields::{
     Diagnostics, FactorizationUsed, Hyperparameters, KernelUsed, Warning, WarningCode,
 };
-use crate::http::serve::fitted::Fitted;
+use crate::http::serve::fitted::FitModel;
 use crate::http::serve::plan::words;
 use gramian_numerics::model::Report;
 use gramian_numerics::solver::trend::Trend;
@@ -17,7 +17,7 @@ const TOO_SMALL: &str = "squares of the values underflow float64: their variance
 const MISFIT_OF_LEARNED: &str = "deviations there may be too small: check these values, or use a kernel with a shorter length scale or less smoothness";
 const MISFIT_OF_GIVEN: &str = "deviations are too small: leave out kernel and alpha so that they are learned, or raise variance and alpha";
 
-impl Fitted {
+impl FitModel {
     /// Returns the diagnostics of this fit and of the function or surface served from it.
     pub fn diagnostics(&self, report: &Report, n_queries: usize) -> Diagnostics {
         let plan = &self.plan;

@@ -1,5 +1,6 @@
 //! Fits of a request, as far as the request defines them, before anything is computed.
 
+mod fits;
 mod resolved;
 mod surface;
 mod values;
@@ -10,6 +11,7 @@ use crate::http::fields::DuplicatePolicy;
 use crate::http::problem::{Pointers, Problem};
 use crate::store::Owner;
 use crate::store::clouds::RegisteredCloud;
+pub use fits::{FitPlans, PlannedFits};
 use gramian_numerics::machine::price::Price;
 use gramian_numerics::model::choose::AutoReason;
 use gramian_numerics::observer::Observer;

@@ -67,7 +67,7 @@ impl Planner<'_> {
     /// Returns the errors of [`Planner::cloud`], and 422 for a kernel or noise that is refused.
     pub fn landmark_probe(
         &mut self,
-        request: &mut impl HasCloud,
+        request: &mut dyn HasCloud,
         values: ValuesUse,
     ) -> Result<Option<LandmarkProbe>, Problem> {
         let max_dense_points = self.app.config.max_dense_points;

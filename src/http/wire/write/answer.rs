@@ -26,7 +26,7 @@ pub trait Answer {
     ///
     /// # Errors
     /// 422 `invalid-request` if a number is not finite, because JSON cannot represent it.
-    fn into_parts(self) -> Result<Parts, Problem>;
+    fn into_parts(self: Box<Self>) -> Result<Parts, Problem>;
 }
 
 /// Declares an answer: its schema for the `OpenAPI` document and its [`Answer`] implementation.
@@ -44,7 +44,7 @@ macro_rules! answer {
         }
 
         impl $crate::http::wire::write::answer::Answer for $name {
-            fn into_parts(self) -> Result<$crate::http::wire::write::answer::Parts, $crate::http::problem::Problem> {
+            fn into_parts(self: Box<Self>) -> Result<$crate::http::wire::write::answer::Parts, $crate::http::problem::Problem> {
                 let mut parts = $crate::http::wire::write::answer::Parts::default();
                 $($crate::http::wire::write::answer::Member::add_to(self.$field, stringify!($field), &mut parts)?;)*
                 Ok(parts)
@@ -286,7 +286,7 @@ mod tests {
 
     fn written(answer: Sample, format: Format) -> Vec<u8> {
         let mut bytes = Vec::new();
-        let chunks = answer.into_parts().ok().unwrap().write(format).unwrap();
+        let chunks = Box::new(answer).into_parts().ok().unwrap().write(format).unwrap();
         chunks.iter().for_each(|chunk| chunk.write(&mut bytes));
         bytes
     }
@@ -329,12 +329,12 @@ mod tests {
 
     #[test]
     fn what_json_cannot_say_is_refused_in_every_format() {
-        let refusal = sample(Array::new(vec![f64::NAN], &[1])).into_parts().err();
+        let refusal = Box::new(sample(Array::new(vec![f64::NAN], &[1]))).into_parts().err();
         assert_eq!(refusal.map(|problem| problem.slug()), Some(Slug::InvalidRequest));
         let infinite = Sample { score: f64::INFINITY, ..sample(with_null()) };
-        assert!(infinite.into_parts().is_err());
+        assert!(Box::new(infinite).into_parts().is_err());
         let in_a_list = Sample { scores: Some(vec![1.0, f64::NEG_INFINITY]), ..sample(with_null()) };
-        let refusal = in_a_list.into_parts().err();
+        let refusal = Box::new(in_a_list).into_parts().err();
         assert_eq!(refusal.map(|problem| problem.slug()), Some(Slug::InvalidRequest));
     }
 }

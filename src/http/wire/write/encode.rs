@@ -53,7 +53,7 @@ impl Encoded {
     ///
     /// # Errors
     /// Returns the errors of [`Answer::into_parts`], or 500 `internal` if a compressor fails.
-    pub fn of(answer: impl Answer, wanted: Wanted) -> Result<Self, Problem> {
+    pub fn of(answer: Box<dyn Answer>, wanted: Wanted) -> Result<Self, Problem> {
         let Wanted { format, coding } = wanted;
         let chunks = answer.into_parts()?.write(format)?;
         let encoded = |coding, body| Ok(Self { format, coding, body });
