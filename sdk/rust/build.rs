@@ -1,4 +1,6 @@
 //! Generates the client from the `OpenAPI` document of the service into `client.rs` of `OUT_DIR`.
+//!
+//! openapi.json and `version_3_0.rs` are links to files of the service. A package has the files themselves.
 
 mod version_3_0;
 
