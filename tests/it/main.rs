@@ -58,4 +58,3 @@ mod tiles;
 mod tls;
 mod unsolvable;
 mod values;
-mod version_3_0;

@@ -72,6 +72,9 @@ async fn the_process_describes_itself() {
     let document = server.get("/openapi.json").await;
     assert_eq!(document.header("content-type"), "application/json");
     assert_eq!(document.text, gramian::http::openapi_json());
+    let document_3_0 = server.get("/openapi-3.0.json").await;
+    assert_eq!(document_3_0.header("content-type"), "application/json");
+    assert_eq!(document_3_0.text, gramian::http::openapi_3_0_json());
     for route in &ROUTES {
         assert!(document.json()["paths"][route.path]["post"].is_object(), "{}", route.path);
     }

@@ -22,7 +22,7 @@ from gramian.resources import selection
 from gramian.rest import api, models
 from gramian.rest.types import File, Response, Unset
 
-MODELS = [model for model in vars(models).values() if inspect.isclass(model)]
+MODELS = [getattr(models, name) for name in models.__all__]
 OBJECTS = [model for model in MODELS if attrs.has(model)]
 ENUMERATIONS = [model for model in MODELS if issubclass(model, enum.Enum)]
 

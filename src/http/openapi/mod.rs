@@ -9,6 +9,7 @@ mod headers;
 mod links;
 mod optional;
 pub mod responses;
+pub mod version_3_0;
 
 use serde_json::Value;
 use utoipa::openapi::RefOr;
@@ -103,7 +104,7 @@ pub fn to_value(document: &utoipa::openapi::OpenApi) -> Value {
     document
 }
 
-/// Returns the text of a document, as served and committed.
+/// Returns the text of a document, as it is served.
 pub fn to_text(document: &Value) -> String {
     format!("{document:#}\n")
 }

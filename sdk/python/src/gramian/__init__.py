@@ -9,7 +9,7 @@
 
 `Client` stands for the service. `Cloud` stands for a registered cloud of points, with a method for each
 operation. Answers are NumPy arrays in dataclasses (`gramian.answers`). Refusals are exceptions (`Problem`).
-`gramian.rest` is the complete client, generated from the service's OpenAPI document.
+`gramian.rest` is the complete client, generated from the service's OpenAPI document (in a clone, by `sdk/python/generate`).
 """
 
 import copyreg

@@ -1,99 +1,111 @@
 """Contains all the data models used in inputs/outputs"""
 
-from .border import Border
-from .bounding_box import BoundingBox
-from .cloud import Cloud
-from .cloud_list import CloudList
-from .cloud_ref import CloudRef
-from .cloud_request import CloudRequest
-from .coarse_request import CoarseRequest
-from .coarse_response import CoarseResponse
-from .curvatures_request import CurvaturesRequest
-from .curvatures_response import CurvaturesResponse
-from .degenerate import Degenerate
-from .degenerate_reason import DegenerateReason
-from .diagnostics import Diagnostics
-from .duplicate_policy import DuplicatePolicy
-from .estimate_request import EstimateRequest
-from .estimate_response import EstimateResponse
-from .factorization_used import FactorizationUsed
-from .family_score import FamilyScore
-from .field_error import FieldError
-from .free_parameter import FreeParameter
-from .geometry import Geometry
-from .geometry_include import GeometryInclude
-from .health import Health
-from .hyperparameters import Hyperparameters
-from .interpolation_batch_request import InterpolationBatchRequest
-from .interpolation_batch_response import InterpolationBatchResponse
-from .interpolation_request import InterpolationRequest
-from .interpolation_response import InterpolationResponse
-from .job import Job
-from .job_progress import JobProgress
-from .job_status import JobStatus
-from .kernel import Kernel
-from .kernel_description import KernelDescription
-from .kernel_family import KernelFamily
-from .kernel_list import KernelList
-from .kernel_parameter import KernelParameter
-from .kernel_used import KernelUsed
-from .laplace_beltrami_matrix_request import LaplaceBeltramiMatrixRequest
-from .laplace_beltrami_matrix_response import LaplaceBeltramiMatrixResponse
-from .laplace_beltrami_request import LaplaceBeltramiRequest
-from .laplace_beltrami_response import LaplaceBeltramiResponse
-from .laplace_beltrami_sparse_matrix_request import LaplaceBeltramiSparseMatrixRequest
-from .laplace_beltrami_sparse_matrix_response import LaplaceBeltramiSparseMatrixResponse
-from .left_out import LeftOut
-from .level_set_request import LevelSetRequest
-from .level_set_response import LevelSetResponse
-from .link import Link
-from .matrix_format import MatrixFormat
-from .mean_choice import MeanChoice
-from .mesh_bounds import MeshBounds
-from .mesh_include import MeshInclude
-from .mesh_part import MeshPart
-from .mesh_quality import MeshQuality
-from .model_selection_request import ModelSelectionRequest
-from .model_selection_response import ModelSelectionResponse
-from .noise_ratio import NoiseRatio
-from .normals_request import NormalsRequest
-from .normals_response import NormalsResponse
-from .operation_name import OperationName
-from .orientation_choice import OrientationChoice
-from .path_entry import PathEntry
-from .posterior_batch_request import PosteriorBatchRequest
-from .posterior_batch_response import PosteriorBatchResponse
-from .posterior_quantity import PosteriorQuantity
-from .posterior_request import PosteriorRequest
-from .posterior_response import PosteriorResponse
-from .problem import Problem
-from .region import Region
-from .regions_request import RegionsRequest
-from .regions_response import RegionsResponse
-from .samples import Samples
-from .selection_criterion import SelectionCriterion
-from .selection_parameter import SelectionParameter
-from .sides_request import SidesRequest
-from .sides_response import SidesResponse
-from .smoothness import Smoothness
-from .solver_choice import SolverChoice
-from .solver_used import SolverUsed
-from .spacing import Spacing
-from .stencils_used import StencilsUsed
-from .surface_choice import SurfaceChoice
-from .surface_gradient_matrix_request import SurfaceGradientMatrixRequest
-from .surface_gradient_matrix_response import SurfaceGradientMatrixResponse
-from .surface_gradient_request import SurfaceGradientRequest
-from .surface_gradient_response import SurfaceGradientResponse
-from .surface_gradient_sparse_matrix_request import SurfaceGradientSparseMatrixRequest
-from .surface_gradient_sparse_matrix_response import SurfaceGradientSparseMatrixResponse
-from .surface_used import SurfaceUsed
-from .tile_regions import TileRegions
-from .values_include import ValuesInclude
-from .version import Version
-from .vertex_support import VertexSupport
-from .warning import Warning_
-from .warning_code import WarningCode
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .border import Border
+    from .bounding_box import BoundingBox
+    from .cloud import Cloud
+    from .cloud_list import CloudList
+    from .cloud_ref import CloudRef
+    from .cloud_request import CloudRequest
+    from .coarse_request import CoarseRequest
+    from .coarse_response import CoarseResponse
+    from .curvatures_request import CurvaturesRequest
+    from .curvatures_response import CurvaturesResponse
+    from .degenerate import Degenerate
+    from .degenerate_reason import DegenerateReason
+    from .diagnostics import Diagnostics
+    from .duplicate_policy import DuplicatePolicy
+    from .estimate_request import EstimateRequest
+    from .estimate_response import EstimateResponse
+    from .factorization_used import FactorizationUsed
+    from .family_score import FamilyScore
+    from .field_error import FieldError
+    from .free_parameter import FreeParameter
+    from .geometry import Geometry
+    from .geometry_include import GeometryInclude
+    from .health import Health
+    from .hyperparameters import Hyperparameters
+    from .interpolation_batch_request import InterpolationBatchRequest
+    from .interpolation_batch_response import InterpolationBatchResponse
+    from .interpolation_request import InterpolationRequest
+    from .interpolation_response import InterpolationResponse
+    from .job import Job
+    from .job_progress import JobProgress
+    from .job_status import JobStatus
+    from .kernel import Kernel
+    from .kernel_description import KernelDescription
+    from .kernel_family import KernelFamily
+    from .kernel_list import KernelList
+    from .kernel_parameter import KernelParameter
+    from .kernel_used import KernelUsed
+    from .laplace_beltrami_matrix_request import LaplaceBeltramiMatrixRequest
+    from .laplace_beltrami_matrix_response import LaplaceBeltramiMatrixResponse
+    from .laplace_beltrami_request import LaplaceBeltramiRequest
+    from .laplace_beltrami_response import LaplaceBeltramiResponse
+    from .laplace_beltrami_sparse_matrix_request import (
+        LaplaceBeltramiSparseMatrixRequest,
+    )
+    from .laplace_beltrami_sparse_matrix_response import (
+        LaplaceBeltramiSparseMatrixResponse,
+    )
+    from .left_out import LeftOut
+    from .level_set_request import LevelSetRequest
+    from .level_set_response import LevelSetResponse
+    from .link import Link
+    from .matrix_format import MatrixFormat
+    from .mean_choice import MeanChoice
+    from .mesh_bounds import MeshBounds
+    from .mesh_include import MeshInclude
+    from .mesh_part import MeshPart
+    from .mesh_quality import MeshQuality
+    from .model_selection_request import ModelSelectionRequest
+    from .model_selection_response import ModelSelectionResponse
+    from .noise_ratio import NoiseRatio
+    from .normals_request import NormalsRequest
+    from .normals_response import NormalsResponse
+    from .operation_name import OperationName
+    from .orientation_choice import OrientationChoice
+    from .path_entry import PathEntry
+    from .posterior_batch_request import PosteriorBatchRequest
+    from .posterior_batch_response import PosteriorBatchResponse
+    from .posterior_quantity import PosteriorQuantity
+    from .posterior_request import PosteriorRequest
+    from .posterior_response import PosteriorResponse
+    from .problem import Problem
+    from .region import Region
+    from .regions_request import RegionsRequest
+    from .regions_response import RegionsResponse
+    from .samples import Samples
+    from .selection_criterion import SelectionCriterion
+    from .selection_parameter import SelectionParameter
+    from .sides_request import SidesRequest
+    from .sides_response import SidesResponse
+    from .smoothness import Smoothness
+    from .solver_choice import SolverChoice
+    from .solver_used import SolverUsed
+    from .spacing import Spacing
+    from .stencils_used import StencilsUsed
+    from .surface_choice import SurfaceChoice
+    from .surface_gradient_matrix_request import SurfaceGradientMatrixRequest
+    from .surface_gradient_matrix_response import SurfaceGradientMatrixResponse
+    from .surface_gradient_request import SurfaceGradientRequest
+    from .surface_gradient_response import SurfaceGradientResponse
+    from .surface_gradient_sparse_matrix_request import (
+        SurfaceGradientSparseMatrixRequest,
+    )
+    from .surface_gradient_sparse_matrix_response import (
+        SurfaceGradientSparseMatrixResponse,
+    )
+    from .surface_used import SurfaceUsed
+    from .tile_regions import TileRegions
+    from .values_include import ValuesInclude
+    from .version import Version
+    from .vertex_support import VertexSupport
+    from .warning import Warning_
+    from .warning_code import WarningCode
 
 __all__ = (
     "Border",
@@ -191,3 +203,111 @@ __all__ = (
     "WarningCode",
     "Warning_",
 )
+
+if not TYPE_CHECKING:
+    _MODULES = {
+        "Border": ".border",
+        "BoundingBox": ".bounding_box",
+        "Cloud": ".cloud",
+        "CloudList": ".cloud_list",
+        "CloudRef": ".cloud_ref",
+        "CloudRequest": ".cloud_request",
+        "CoarseRequest": ".coarse_request",
+        "CoarseResponse": ".coarse_response",
+        "CurvaturesRequest": ".curvatures_request",
+        "CurvaturesResponse": ".curvatures_response",
+        "Degenerate": ".degenerate",
+        "DegenerateReason": ".degenerate_reason",
+        "Diagnostics": ".diagnostics",
+        "DuplicatePolicy": ".duplicate_policy",
+        "EstimateRequest": ".estimate_request",
+        "EstimateResponse": ".estimate_response",
+        "FactorizationUsed": ".factorization_used",
+        "FamilyScore": ".family_score",
+        "FieldError": ".field_error",
+        "FreeParameter": ".free_parameter",
+        "Geometry": ".geometry",
+        "GeometryInclude": ".geometry_include",
+        "Health": ".health",
+        "Hyperparameters": ".hyperparameters",
+        "InterpolationBatchRequest": ".interpolation_batch_request",
+        "InterpolationBatchResponse": ".interpolation_batch_response",
+        "InterpolationRequest": ".interpolation_request",
+        "InterpolationResponse": ".interpolation_response",
+        "Job": ".job",
+        "JobProgress": ".job_progress",
+        "JobStatus": ".job_status",
+        "Kernel": ".kernel",
+        "KernelDescription": ".kernel_description",
+        "KernelFamily": ".kernel_family",
+        "KernelList": ".kernel_list",
+        "KernelParameter": ".kernel_parameter",
+        "KernelUsed": ".kernel_used",
+        "LaplaceBeltramiMatrixRequest": ".laplace_beltrami_matrix_request",
+        "LaplaceBeltramiMatrixResponse": ".laplace_beltrami_matrix_response",
+        "LaplaceBeltramiRequest": ".laplace_beltrami_request",
+        "LaplaceBeltramiResponse": ".laplace_beltrami_response",
+        "LaplaceBeltramiSparseMatrixRequest": ".laplace_beltrami_sparse_matrix_request",
+        "LaplaceBeltramiSparseMatrixResponse": ".laplace_beltrami_sparse_matrix_response",
+        "LeftOut": ".left_out",
+        "LevelSetRequest": ".level_set_request",
+        "LevelSetResponse": ".level_set_response",
+        "Link": ".link",
+        "MatrixFormat": ".matrix_format",
+        "MeanChoice": ".mean_choice",
+        "MeshBounds": ".mesh_bounds",
+        "MeshInclude": ".mesh_include",
+        "MeshPart": ".mesh_part",
+        "MeshQuality": ".mesh_quality",
+        "ModelSelectionRequest": ".model_selection_request",
+        "ModelSelectionResponse": ".model_selection_response",
+        "NoiseRatio": ".noise_ratio",
+        "NormalsRequest": ".normals_request",
+        "NormalsResponse": ".normals_response",
+        "OperationName": ".operation_name",
+        "OrientationChoice": ".orientation_choice",
+        "PathEntry": ".path_entry",
+        "PosteriorBatchRequest": ".posterior_batch_request",
+        "PosteriorBatchResponse": ".posterior_batch_response",
+        "PosteriorQuantity": ".posterior_quantity",
+        "PosteriorRequest": ".posterior_request",
+        "PosteriorResponse": ".posterior_response",
+        "Problem": ".problem",
+        "Region": ".region",
+        "RegionsRequest": ".regions_request",
+        "RegionsResponse": ".regions_response",
+        "Samples": ".samples",
+        "SelectionCriterion": ".selection_criterion",
+        "SelectionParameter": ".selection_parameter",
+        "SidesRequest": ".sides_request",
+        "SidesResponse": ".sides_response",
+        "Smoothness": ".smoothness",
+        "SolverChoice": ".solver_choice",
+        "SolverUsed": ".solver_used",
+        "Spacing": ".spacing",
+        "StencilsUsed": ".stencils_used",
+        "SurfaceChoice": ".surface_choice",
+        "SurfaceGradientMatrixRequest": ".surface_gradient_matrix_request",
+        "SurfaceGradientMatrixResponse": ".surface_gradient_matrix_response",
+        "SurfaceGradientRequest": ".surface_gradient_request",
+        "SurfaceGradientResponse": ".surface_gradient_response",
+        "SurfaceGradientSparseMatrixRequest": ".surface_gradient_sparse_matrix_request",
+        "SurfaceGradientSparseMatrixResponse": ".surface_gradient_sparse_matrix_response",
+        "SurfaceUsed": ".surface_used",
+        "TileRegions": ".tile_regions",
+        "ValuesInclude": ".values_include",
+        "Version": ".version",
+        "VertexSupport": ".vertex_support",
+        "Warning_": ".warning",
+        "WarningCode": ".warning_code",
+    }
+
+    def __getattr__(name):
+        """Imports a model when it is first used"""
+        if name not in _MODULES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        globals()[name] = getattr(import_module(_MODULES[name], __name__), name)
+        return globals()[name]
+
+    def __dir__():
+        return sorted({*globals(), *_MODULES})

@@ -1,4 +1,6 @@
 //! The document for generators that only support `OpenAPI` 3.0: the same operations and types, but JSON only.
+//!
+//! The Rust client derives its document by this file too (sdk/rust/build.rs), so it needs serde_json alone.
 
 use serde_json::{Map, Value, json};
 
@@ -14,8 +16,7 @@ const WHAT_IS_DIFFERENT: &str = " This document is for tools that stop at OpenAP
 /// references, licences. All bodies are `application/json`, including problem documents, since generators
 /// know no other type. Operations that only answer with HTML pages are left out, and so are links, which
 /// generators ignore.
-pub fn derive(document: &Value) -> Value {
-    let mut document = document.clone();
+pub fn derive(mut document: Value) -> Value {
     document["openapi"] = json!("3.0.3");
     if let Some(license) = document.pointer_mut("/info/license").and_then(Value::as_object_mut) {
         license.shift_remove("identifier");
@@ -114,33 +115,42 @@ fn wrap_reference(object: &mut Object) {
     }
 }
 
-#[test]
-fn what_3_0_cannot_say_is_said_its_way() {
-    let derived = |schema: Value| derive(&json!({"schema": schema}))["schema"].clone();
-    assert_eq!(derived(json!({"type": ["array", "null"]})), json!({"type": "array", "nullable": true}));
-    assert_eq!(derived(json!({"exclusiveMinimum": 0.0})), json!({"minimum": 0.0, "exclusiveMinimum": true}));
-    let reference = "#/components/schemas/A";
-    let described = json!({"$ref": reference, "description": "An A."});
-    assert_eq!(derived(described), json!({"description": "An A.", "allOf": [{"$ref": reference}]}));
-    assert_eq!(derived(json!({"$ref": reference})), json!({"$ref": reference}));
-    let named_as_keywords =
-        json!({"properties": {"links": {"type": "object"}, "content": {"type": "object"}}});
-    assert_eq!(derived(named_as_keywords.clone()), named_as_keywords);
-    let example = json!({"example": {"type": ["x", "null"]}});
-    assert_eq!(derived(example.clone()), example);
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-#[test]
-fn bodies_are_json_and_pages_are_left_out() {
-    let answers = |media_type: &str| {
-        json!({"responses": {"200": {"content": {media_type: {}, "application/x-npy": {}},
-                                    "links": {"next": {}}},
-                             "404": {"content": {"application/problem+json": {}}}}})
-    };
-    let paths = json!({"/a": {"get": answers("application/json"), "post": answers("text/html")}, "/b": {"get": answers("text/html")}});
-    let derived = derive(&json!({"paths": paths, "info": {"license": {"name": "MIT", "identifier": "MIT"}}}));
-    let json = json!({"content": {"application/json": {}}});
-    assert_eq!(derived["paths"], json!({"/a": {"get": {"responses": {"200": json, "404": json}}}}));
-    assert_eq!(derived["info"], json!({"license": {"name": "MIT"}}));
-    assert_eq!(derived["openapi"], "3.0.3");
+    #[test]
+    fn what_3_0_cannot_say_is_said_its_way() {
+        let derived = |schema: Value| derive(json!({"schema": schema}))["schema"].clone();
+        assert_eq!(derived(json!({"type": ["array", "null"]})), json!({"type": "array", "nullable": true}));
+        assert_eq!(
+            derived(json!({"exclusiveMinimum": 0.0})),
+            json!({"minimum": 0.0, "exclusiveMinimum": true})
+        );
+        let reference = "#/components/schemas/A";
+        let described = json!({"$ref": reference, "description": "An A."});
+        assert_eq!(derived(described), json!({"description": "An A.", "allOf": [{"$ref": reference}]}));
+        assert_eq!(derived(json!({"$ref": reference})), json!({"$ref": reference}));
+        let named_as_keywords =
+            json!({"properties": {"links": {"type": "object"}, "content": {"type": "object"}}});
+        assert_eq!(derived(named_as_keywords.clone()), named_as_keywords);
+        let example = json!({"example": {"type": ["x", "null"]}});
+        assert_eq!(derived(example.clone()), example);
+    }
+
+    #[test]
+    fn bodies_are_json_and_pages_are_left_out() {
+        let answers = |media_type: &str| {
+            json!({"responses": {"200": {"content": {media_type: {}, "application/x-npy": {}},
+                                        "links": {"next": {}}},
+                                 "404": {"content": {"application/problem+json": {}}}}})
+        };
+        let paths = json!({"/a": {"get": answers("application/json"), "post": answers("text/html")}, "/b": {"get": answers("text/html")}});
+        let derived =
+            derive(json!({"paths": paths, "info": {"license": {"name": "MIT", "identifier": "MIT"}}}));
+        let json = json!({"content": {"application/json": {}}});
+        assert_eq!(derived["paths"], json!({"/a": {"get": {"responses": {"200": json, "404": json}}}}));
+        assert_eq!(derived["info"], json!({"license": {"name": "MIT"}}));
+        assert_eq!(derived["openapi"], "3.0.3");
+    }
 }

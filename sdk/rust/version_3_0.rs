@@ -1,0 +1,1 @@
+../../src/http/openapi/version_3_0.rs
