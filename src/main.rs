@@ -63,7 +63,9 @@ fn main() -> ExitCode {
         Some(Command::Key { name }) => make_key(&name).map_err(Into::into),
         None => {
             let log = telemetry::start();
-            let served = runtime().map_err(Into::into).and_then(|runtime| runtime.block_on(serve(config, while_stdin)));
+            let served = runtime()
+                .map_err(Into::into)
+                .and_then(|runtime| runtime.block_on(serve(config, while_stdin)));
             log.mention_losses();
             served
         }
