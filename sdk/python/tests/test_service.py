@@ -140,6 +140,7 @@ def test_a_service_that_was_killed_is_replaced() -> None:
         gramian.cloud(points)
         [service] = services()
         psutil.Process(service).kill()
+        os.waitid(os.P_PID, service, os.WEXITED | os.WNOWAIT)
         gramian.cloud(points)
         [other] = services()
         assert other != service
@@ -154,7 +155,8 @@ def test_the_service_at_the_address_of_the_environment_is_preferred(circle: Arra
     assert psutil.Process().children() == before
 
 
-def test_a_service_of_ones_own_ends_with_its_block() -> None:
+def test_a_service_of_ones_own_ends_with_its_block(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("GRAMIAN_BINARY", raising=False)
     with gramian.local() as client:
         assert client.version().version == importlib.metadata.version("gramian")
         assert client.cloud([[0, 0], [1, 0], [0, 1]]).n_points == 3

@@ -33,8 +33,10 @@ class SharedClients:
             return self._clients[url, key]
 
     def _local_url(self) -> str:
-        if self._service is None or not self._service.is_running():
-            self._service = LocalService(find_program())
+        if self._service and not self._service.is_running():
+            self._service.stop()
+            self._service = None
+        self._service = self._service or LocalService(find_program())
         return self._service.url
 
     def close(self) -> None:
