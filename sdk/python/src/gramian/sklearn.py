@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
-from functools import cache
 from typing import Any, Literal, Self, overload
 
 import numpy as np
@@ -16,6 +14,7 @@ from .client import Client
 from .resources.cloud import Cloud
 from .rest.models import KernelUsed, SolverUsed
 from .rest.types import Unset
+from .service import shared_client
 from .wire.problems import NotPositiveDefinite, Problem
 from .wire.tensors import Array
 
@@ -54,8 +53,9 @@ class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
     duplicates : str, optional
         Policy for samples at the same place when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
     client : Client or str, optional
-        The service, or its address. If absent, as `gramian.Client()` finds it. Clones share a `Client`. A
-        pickle keeps only its address, and the key is that of `GRAMIAN_API_KEY` where the pickle is loaded.
+        The service, or its address. If absent, that of `gramian.cloud`: at `GRAMIAN_URL`, or else on this
+        machine, one for each process. Clones share a `Client`. A pickle keeps only its address, and the key
+        is that of `GRAMIAN_API_KEY` where the pickle is loaded.
 
     Attributes
     ----------
@@ -209,8 +209,7 @@ class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
     def _service(self) -> Client:
         if isinstance(self.client, Client):
             return self.client
-        address = self.client or os.environ.get("GRAMIAN_URL")
-        return _shared_client(address, os.environ.get("GRAMIAN_API_KEY"), os.getpid())
+        return shared_client(self.client)
 
     def _choices(self, n: int) -> dict[str, Any]:
         """Returns the parameters as keywords of `Cloud.posterior`."""
@@ -245,12 +244,6 @@ class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
         cloud = Cloud(self._service()._connection, self._description, self.X_train_)
         fits = zip(self._columns(), self._fits, strict=True)
         return [cloud.posterior(values, queries, include=include, **fit) for values, fit in fits]
-
-
-@cache
-def _shared_client(address: str | None, key: str | None, process: int) -> Client:  # noqa: ARG001
-    """Returns the shared client of this process for an address. It keeps its connections from fit to fit."""
-    return Client(address, api_key=key)
 
 
 def _registered(client: Client, points: Array) -> Cloud:
