@@ -1,5 +1,6 @@
-// Draws the figures of the paper: opens each scene on the page of the server at GRAMIAN_URL, saves its picture beside
-// this file, and writes docs/gallery.md with links to the scenes. Also draws docs/page.png, the page as it opens.
+// Draws the figures of the paper: opens each scene on the page of the server at GRAMIAN_URL, saves its
+// picture beside this file, and writes docs/gallery.md with links to the scenes. Also draws docs/page.png,
+// the page as it opens.
 
 import { writeFileSync } from "node:fs";
 import { createRequire } from "node:module";

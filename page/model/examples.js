@@ -66,7 +66,9 @@ function sphere(n, noise) {
   }));
 }
 
-/** A torus of radii 1 and 0.4 with points on a lattice of the golden ratio, as many on each part of its area. */
+/**
+ * A torus of radii 1 and 0.4 with points on a lattice of the golden ratio, as many on each part of its area.
+ */
 function lattice(n) {
   const golden = (Math.sqrt(5) - 1) / 2;
   return cloud("torus", Array.from({ length: n }, (_, at) => {

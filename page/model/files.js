@@ -189,7 +189,10 @@ function pcd(bytes) {
   return rowsOf(bytes, body, n, fields, true);
 }
 
-/** Columns without the rows of organised scans where nothing was measured, which have NaN, and the number of those. */
+/**
+ * Columns without the rows of organised scans where nothing was measured, which have NaN, and the number of
+ * those.
+ */
 function withoutGaps(columns) {
   const positions = POSITIONS.map((axis) => columns.get(axis)).filter(Boolean);
   const rows = Array.from(columns.values().next().value?.keys() ?? []);

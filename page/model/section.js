@@ -15,8 +15,8 @@ const HIGH = [0.05, 0.35, 0.15];
 const LINE = [0.85, 0.1, 0.1];
 
 /**
- * The plane through a cloud at right angles to an axis, at a part of the cloud's extent. Flat clouds are their own.
- * Returns the centre and two half edges.
+ * The plane through a cloud at right angles to an axis, at a part of the cloud's extent. Flat clouds are
+ * their own. Returns the centre and two half edges.
  */
 export function planeOf(points, axis, share) {
   const d = points.width;

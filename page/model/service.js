@@ -59,8 +59,8 @@ export async function register(points, normals, signal) {
 }
 
 /**
- * Computes an answer. `follow` is called with the progress of long computations. Aborting the signal cancels the
- * computation in the service too.
+ * Computes an answer. `follow` is called with the progress of long computations. Aborting the signal cancels
+ * the computation in the service too.
  */
 export async function compute(path, request, { nPoints, signal, follow, tensors }) {
   const body = tensors ? encode(tensors, request) : JSON.stringify(request);

@@ -1,5 +1,5 @@
-// The request on screen as a command or a program. People copy and run it, so every text from a link, a file or a
-// server is quoted for its language.
+// The request on screen as a command or a program. People copy and run it, so every text from a link, a file
+// or a server is quoted for its language.
 
 import { OPERATIONS } from "./operations.js";
 
@@ -59,7 +59,10 @@ function ofPython(value) {
   return quoted(value);
 }
 
-/** A value in JSON, whose strings are those of JavaScript and Python too. Characters that nobody sees are escaped. */
+/**
+ * A value in JSON, whose strings are those of JavaScript and Python too. Characters that nobody sees are
+ * escaped.
+ */
 function quoted(value) {
   return JSON.stringify(value).replace(/[\p{Cc}\p{Cf}\p{Zl}\p{Zp}]/gu, escaped);
 }

@@ -33,15 +33,17 @@ export const DEFAULTS = {
 const WORDS = { colour: ["quantity", "support"] };
 
 /**
- * The words that each setting may have: the choices of the form. The quantities to colour by follow from an answer,
- * and are looked up there.
+ * The words that each setting may have: the choices of the form. The quantities to colour by follow from an
+ * answer, and are looked up there.
  */
 export function wordsOf(form) {
   const choices = [...form.querySelectorAll("select")].filter(({ name }) => name !== "quantity");
   return { ...WORDS, ...Object.fromEntries(choices.map(({ name, options }) => [name, Array.from(options, ({ value }) => value)])) };
 }
 
-/** Settings from the fragment of a link. Unknown names, unknown words and senseless numbers are passed over. */
+/**
+ * Settings from the fragment of a link. Unknown names, unknown words and senseless numbers are passed over.
+ */
 export function fromHash(hash, words) {
   const given = new URLSearchParams(hash.replace(/^#/, ""));
   const settings = { ...DEFAULTS };

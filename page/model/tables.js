@@ -1,5 +1,5 @@
-// Clouds as rows of numbers. docs/operations.md has the rules ("Rows of numbers"). src/files/table is the reader of the
-// subcommands, and tests/tables holds both to the same outcomes.
+// Clouds as rows of numbers. docs/operations.md has the rules ("Rows of numbers"). src/files/table is the
+// reader of the subcommands, and tests/tables holds both to the same outcomes.
 
 /** Decimal numbers, with a decimal point. Number() alone takes "" for 0, and hexadecimal digits. */
 const NUMBER = /^[+-]?(\d+(\.\d*)?|\.\d+)(e[+-]?\d+)?$/i;
@@ -46,7 +46,10 @@ function contentOf(text) {
     .filter((line) => !/^[ \t]*($|#|\/\/)/.test(line.text));
 }
 
-/** Takes the number of points from the lines, if the first is one, and the comment that may follow in XYZ files. */
+/**
+ * Takes the number of points from the lines, if the first is one, and the comment that may follow in XYZ
+ * files.
+ */
 function takeCount(lines) {
   if (!/^[ \t]*\d+[ \t]*$/.test(lines[0]?.text ?? "")) return undefined;
   const { number, text } = lines.shift();

@@ -1,4 +1,5 @@
-// What the picture says in words and numbers: summary, marks by reason, the point under the pointer, diagnostics.
+// What the picture says in words and numbers: summary, marks by reason, the point under the pointer,
+// diagnostics.
 
 import { SUPPORT, cssOf, shown } from "./colours.js";
 

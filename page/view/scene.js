@@ -41,8 +41,8 @@ export class Scene {
   }
 
   /**
-   * Shows points, or a mesh if there are cells. Positions are relative to their middle, since the graphics processor
-   * has 32 bits.
+   * Shows points, or a mesh if there are cells. Positions are relative to their middle, since the graphics
+   * processor has 32 bits.
    */
   show({ positions, cells, normals, nearby }) {
     const [n, d] = positions.shape;
@@ -140,7 +140,9 @@ export class Scene {
     return (point) => at[point];
   }
 
-  /** Arrows along vectors `[n, …]` at points, `from` the vector's part of each row, both ways for directions. */
+  /**
+   * Arrows along vectors `[n, …]` at points, `from` the vector's part of each row, both ways for directions.
+   */
   arrows(tensor, { offset = 0, isBothWays = false, colour = 0x4477aa } = {}) {
     const d = this.dimension;
     const every = Math.max(1, Math.ceil(this.n / MAX_ARROWS));

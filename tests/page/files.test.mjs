@@ -1,4 +1,5 @@
-// Files that the page reads beside tables: what shifts columns or stands for no number is refused with its place.
+// Files that the page reads beside tables: what shifts columns or stands for no number is refused with its
+// place.
 
 import assert from "node:assert/strict";
 import { test } from "node:test";

@@ -1,4 +1,5 @@
-// The page in a real browser: pictures by their pixels, files, parameters, refusals, cancelling, sizes, rules.
+// The page in a real browser: pictures by their pixels, files, parameters, refusals, cancelling, sizes,
+// rules.
 //
 // Asks the server at GRAMIAN_URL. Screenshots are left in target/page.
 
@@ -30,7 +31,9 @@ before(async () => {
 });
 after(() => browser.close());
 
-/** Opens the page and calls `use`. Nothing may be logged as an error, asked of others, or against the policy. */
+/**
+ * Opens the page and calls `use`. Nothing may be logged as an error, asked of others, or against the policy.
+ */
 async function opened(hash, use, { viewport = DESK, expected = [], ...options } = {}) {
   const context = await browser.newContext({ viewport, ...options });
   const page = await context.newPage();

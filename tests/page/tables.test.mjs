@@ -1,4 +1,5 @@
-// Tables as the page reads them, held to the files and outcomes of tests/tables, as the reader of the subcommands is.
+// Tables as the page reads them, held to the files and outcomes of tests/tables, as the reader of the
+// subcommands is.
 
 import assert from "node:assert/strict";
 import { readdirSync, readFileSync } from "node:fs";
