@@ -1,13 +1,18 @@
-# The service as a small image: `docker build -t gramian . && docker run --rm -p 8080:8080 -e GRAMIAN_ALLOW_ANONYMOUS=1 gramian`.
-# It listens beyond its own machine, so it starts only with keys (GRAMIAN_KEYS_FILE, GRAMIAN_API_KEYS) or with that permission.
-# tests/image.sh builds and runs it where there is no container engine.
+# The service as a small image:
+#
+#     docker build -t gramian .
+#     docker run --rm -p 8080:8080 -e GRAMIAN_ALLOW_ANONYMOUS=1 gramian
+#
+# It listens beyond its own machine, so it starts only with keys (GRAMIAN_KEYS_FILE, GRAMIAN_API_KEYS) or with
+# that permission. tests/image.sh builds and runs it where there is no container engine.
 
 FROM rust:1.95-bookworm AS build
 WORKDIR /src
 COPY . .
-# The caches outlive a build, and cargo tells fresh from stale by modification time: the touch keeps an older checkout
-# from being answered with the binary of a newer one. Cargo's own lock files lie outside the mounts, hence `locked`.
-# Line tables serve debuggers and profilers, not the image; stripping without generating them saves compile time.
+# The caches outlive a build, and cargo tells fresh from stale by modification time: the touch keeps an older
+# checkout from being answered with the binary of a newer one. Cargo's own lock files lie outside the mounts,
+# hence `locked`. Line tables serve debuggers and profilers, not the image; stripping without generating them
+# saves compile time.
 RUN --mount=type=cache,id=gramian-registry,target=/usr/local/cargo/registry,sharing=locked \
     --mount=type=cache,id=gramian-target,target=/target,sharing=locked \
     touch src/lib.rs src/main.rs numerics/src/lib.rs \

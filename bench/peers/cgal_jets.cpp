@@ -1,7 +1,7 @@
 // Principal curvatures of a point cloud by CGAL's jet fitting (Cazals and Pouget 2003).
 //
-// Reads points from standard input, x y z each, and writes the seconds of neighbour search and fits, then the smaller and the
-// larger principal curvature of each point. `cgal_jets NEIGHBOURS`.
+// Reads points from standard input, x y z each, and writes the seconds of neighbour search and fits, then the
+// smaller and the larger principal curvature of each point. `cgal_jets NEIGHBOURS`.
 
 #include <CGAL/Monge_via_jet_fitting.h>
 #include <CGAL/Orthogonal_k_neighbor_search.h>

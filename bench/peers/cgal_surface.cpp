@@ -1,11 +1,14 @@
-// Normals and curvatures of a point cloud by CGAL's jets (Cazals and Pouget 2003), on two threads, for bench/scale.
+// Normals and curvatures of a point cloud by CGAL's jets (Cazals and Pouget 2003), on two threads, for
+// bench/scale.
 //
 //     cgal_surface normals NEIGHBOURS DEGREE < POINTS > NORMALS   jet_estimate_normals
 //     cgal_surface oriented NEIGHBOURS DEGREE < POINTS > NORMALS  the same and mst_orient_normals
-//     cgal_surface curvatures NEIGHBOURS DEGREE < POINTS > ROWS   Monge_via_jet_fitting: normal, smaller and larger curvature
+//     cgal_surface curvatures NEIGHBOURS DEGREE < POINTS > ROWS   Monge_via_jet_fitting
 //
-// Points and results are float64, row by row; a curvature is positive where the surface bends away from the normal. To
-// standard error go the seconds of the work alone and the peak resident memory in bytes.
+// A row of curvatures is the normal, the smaller and the larger curvature.
+//
+// Points and results are float64, row by row; a curvature is positive where the surface bends away from the
+// normal. To standard error go the seconds of the work alone and the peak resident memory in bytes.
 
 #include <CGAL/Monge_via_jet_fitting.h>
 #include <CGAL/Orthogonal_k_neighbor_search.h>

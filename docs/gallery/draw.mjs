@@ -1,5 +1,7 @@
-// Draws the figures of the paper: opens each scene on the page of the server at GRAMIAN_URL, saves its picture beside
-// this file, and writes docs/gallery.md with links to the scenes. Also draws docs/page.png, the page as it opens.
+// @ts-check
+// Draws the figures of the paper: opens each scene on the page of the server at GRAMIAN_URL, saves its
+// picture beside this file, and writes docs/gallery.md with links to the scenes. Also draws docs/page.png,
+// the page as it opens.
 
 import { writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
@@ -15,14 +17,30 @@ const PLANE = "operation=normals&deviations=false&surface=signature&section=2&ar
 
 const SCENES = [
   ["curve", `example=curve&${PLANE}&${LAPLACE(1)}`, "A closed curve from 64 of its points. Laplace's kernel, ε = 1."],
-  ["part", `example=part&${PLANE}&${LAPLACE(1)}`, "The same from 24 points of a part. Inside and outside cannot be told, and the gradient vanishes at the inflection point."],
-  ["triangle-gauss", `example=triangle&${PLANE}&${GAUSS}`, "A triangle from 48 points. Gauss' kernel cuts it into smooth pieces."],
-  ["triangle-laplace", `example=triangle&${PLANE}&${LAPLACE(1e-5)}`, "The same with Laplace's kernel, ε = 1e-5, which takes corners."],
+  [
+    "part",
+    `example=part&${PLANE}&${LAPLACE(1)}`,
+    "The same from 24 points of a part. Inside and outside cannot be told, and the gradient vanishes at the inflection point.",
+  ],
+  [
+    "triangle-gauss",
+    `example=triangle&${PLANE}&${GAUSS}`,
+    "A triangle from 48 points. Gauss' kernel cuts it into smooth pieces.",
+  ],
+  [
+    "triangle-laplace",
+    `example=triangle&${PLANE}&${LAPLACE(1e-5)}`,
+    "The same with Laplace's kernel, ε = 1e-5, which takes corners.",
+  ],
   ["half-16", `example=half&${PLANE}&${GAUSS}`, "Half an ellipse, 16 points: the level set continues the curve."],
   ["half-256", `example=fineHalf&${PLANE}&${GAUSS}`, "Half an ellipse, 256 points."],
   ["square", `example=square&${PLANE}&${GAUSS}`, "A square."],
   ["corner", `example=corner&${PLANE}&${GAUSS}`, "The same square without a corner."],
-  ["noisy-gauss", `example=noisy&${PLANE}&${GAUSS}&alpha=0.1`, "An ellipse from 32 points that were moved by up to 0.1, α = 0.1. Gauss' kernel. Yellow: the exact ellipse."],
+  [
+    "noisy-gauss",
+    `example=noisy&${PLANE}&${GAUSS}&alpha=0.1`,
+    "An ellipse from 32 points that were moved by up to 0.1, α = 0.1. Gauss' kernel. Yellow: the exact ellipse.",
+  ],
   ["noisy-laplace", `example=noisy&${PLANE}&${LAPLACE(1e-5)}&alpha=0.1`, "The same with Laplace's kernel, ε = 1e-5."],
   ["noisy-smooth", `example=noisy&${PLANE}&${LAPLACE(1)}&alpha=0.1`, "The same with ε = 1."],
   ["noisier", `example=noisier&${PLANE}&${LAPLACE(1)}&alpha=0.1`, "Points that were moved by up to 0.25, ε = 1."],
@@ -53,8 +71,12 @@ await page.waitForTimeout(1000);
 await page.screenshot({ path: "docs/page.png" });
 await browser.close();
 
-const rows = SCENES.map(([name, hash, text]) => `## ${text}\n\n[![${text}](gallery/${name}.png)](http://localhost:8080/#${hash})\n`);
-writeFileSync("docs/gallery.md", `# Gallery
+const rows = SCENES.map(
+  ([name, hash, text]) => `## ${text}\n\n[![${text}](gallery/${name}.png)](http://localhost:8080/#${hash})\n`,
+);
+writeFileSync(
+  "docs/gallery.md",
+  `# Gallery
 
 The figures of Guidotti's paper, drawn by the service and its page. Each picture leads to the same scene on the page of a server at
 localhost:8080. Dots are the data, green shades the level regions of u, and the red line is its level on the surface: the mean of u over the
@@ -62,4 +84,5 @@ data. Lines from the dots are normals.
 
 \`docs/gallery/draw target/release/gramian\` draws all of them again.
 
-${rows.join("\n")}`);
+${rows.join("\n")}`,
+);

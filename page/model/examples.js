@@ -1,7 +1,11 @@
+// @ts-check
 // Clouds to begin with. All but the dragon are made here, the same for everyone.
 
 import { Tensor } from "./tensors.js";
 
+/** @import { Cloud } from "../types.d.ts" */
+
+/** @type {Record<string, { title: string, make: () => Cloud | Promise<Cloud> }>} */
 export const EXAMPLES = {
   dragon: { title: "Dragon, 12,000 points of a scan", make: dragon },
   torus: { title: "Torus, 2,000 random points", make: () => torus(2000) },
@@ -58,26 +62,34 @@ function torus(n) {
 function sphere(n, noise) {
   const random = uniform(2);
   const golden = Math.PI * (3 - Math.sqrt(5));
-  return cloud("sphere", Array.from({ length: n }, (_, at) => {
-    const z = 1 - (2 * at + 1) / n;
-    const radius = 1 + noise * normal(random);
-    const across = Math.sqrt(1 - z * z);
-    return [radius * across * Math.cos(golden * at), radius * across * Math.sin(golden * at), radius * z];
-  }));
+  return cloud(
+    "sphere",
+    Array.from({ length: n }, (_, at) => {
+      const z = 1 - (2 * at + 1) / n;
+      const radius = 1 + noise * normal(random);
+      const across = Math.sqrt(1 - z * z);
+      return [radius * across * Math.cos(golden * at), radius * across * Math.sin(golden * at), radius * z];
+    }),
+  );
 }
 
-/** A torus of radii 1 and 0.4 with points on a lattice of the golden ratio, as many on each part of its area. */
+/**
+ * A torus of radii 1 and 0.4 with points on a lattice of the golden ratio, as many on each part of its area.
+ */
 function lattice(n) {
   const golden = (Math.sqrt(5) - 1) / 2;
-  return cloud("torus", Array.from({ length: n }, (_, at) => {
-    const u = 2 * Math.PI * golden * at;
-    const share = (2 * Math.PI * (at + 0.5)) / n;
-    // The area up to v is v + 0.4 sin v of 2π.
-    let v = share;
-    for (let step = 0; step < 8; step++) v -= (v + 0.4 * Math.sin(v) - share) / (1 + 0.4 * Math.cos(v));
-    const radius = 1 + 0.4 * Math.cos(v);
-    return [radius * Math.cos(u), radius * Math.sin(u), 0.4 * Math.sin(v)];
-  }));
+  return cloud(
+    "torus",
+    Array.from({ length: n }, (_, at) => {
+      const u = 2 * Math.PI * golden * at;
+      const share = (2 * Math.PI * (at + 0.5)) / n;
+      // The area up to v is v + 0.4 sin v of 2π.
+      let v = share;
+      for (let step = 0; step < 8; step++) v -= (v + 0.4 * Math.sin(v) - share) / (1 + 0.4 * Math.cos(v));
+      const radius = 1 + 0.4 * Math.cos(v);
+      return [radius * Math.cos(u), radius * Math.sin(u), 0.4 * Math.sin(v)];
+    }),
+  );
 }
 
 /** Points of a curve at equal steps of its parameter, each moved in a random direction by up to `noise`. */
@@ -118,16 +130,28 @@ function polygon(name, n, corners) {
 }
 
 function triangle(n) {
-  return polygon("triangle", n, [90, 210, 330].map((degrees) => {
-    const angle = (Math.PI * degrees) / 180;
-    return [Math.cos(angle), Math.sin(angle)];
-  }));
+  return polygon(
+    "triangle",
+    n,
+    [90, 210, 330].map((degrees) => {
+      const angle = (Math.PI * degrees) / 180;
+      return [Math.cos(angle), Math.sin(angle)];
+    }),
+  );
 }
 
 function square(n, isWhole) {
-  const whole = polygon("square", n, [[-1, -1], [1, -1], [1, 1], [-1, 1]]);
+  const whole = polygon("square", n, [
+    [-1, -1],
+    [1, -1],
+    [1, 1],
+    [-1, 1],
+  ]);
   const rows = Array.from({ length: n }, (_, row) => [...whole.points.data.subarray(2 * row, 2 * row + 2)]);
-  return cloud("square", rows.filter(([x, y]) => isWhole || x < 0.7 || y < 0.7));
+  return cloud(
+    "square",
+    rows.filter(([x, y]) => isWhole || x < 0.7 || y < 0.7),
+  );
 }
 
 /** The dragon with the curvatures that the service found, so that it shows before anything is asked. */
@@ -144,7 +168,9 @@ async function dragon() {
     return Float64Array.from(levels, (level) => least + (level / 65535) * (greatest - least));
   };
   const data = new Float64Array(3 * n);
-  [0, 1, 2].forEach((axis) => column(axis).forEach((x, row) => (data[3 * row + axis] = x)));
+  for (const axis of [0, 1, 2]) {
+    for (const [row, x] of column(axis).entries()) data[3 * row + axis] = x;
+  }
   const found = { mean_curvatures: column(3), mean_curvature_deviations: column(4) };
   const normals = new Float64Array(3 * n);
   const [polar, azimuth] = [column(5), column(6)];

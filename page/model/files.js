@@ -1,13 +1,25 @@
+// @ts-check
 // Clouds from files: PLY, XYZ and CSV, PCD, npy and JSON.
 
 import { NORMALS, numberOf, POSITIONS, table } from "./tables.js";
 import { Tensor } from "./tensors.js";
 
-/** Reads a file by its content, or where that says nothing, by the ending of its name. */
+/** @import { Cloud } from "../types.d.ts" */
+
+/**
+ * Reads a file by its content, or where that says nothing, by the ending of its name.
+ *
+ * @param {File} file
+ */
 export async function readFile(file) {
   return read(new Uint8Array(await file.arrayBuffer()), file.name);
 }
 
+/**
+ * @param {Uint8Array} bytes
+ * @param {string} name
+ * @returns {Cloud}
+ */
 export function read(bytes, name) {
   const start = latin(bytes.subarray(0, 256));
   if (start.startsWith("ply")) return cloudOf(ply(bytes), name);
@@ -30,20 +42,27 @@ function decoded(bytes) {
   }
 }
 
-/** A cloud from named columns: positions, normals if there are any, and everything else as values. */
+/**
+ * A cloud from named columns: positions, normals if there are any, and everything else as values.
+ *
+ * @param {Map<string, Float64Array>} columns
+ * @param {string} name
+ */
 function cloudOf(columns, name) {
   const names = [...columns.keys()];
-  const lower = new Map(names.map((column) => [column.toLowerCase(), column]));
+  const lower = new Map([...columns].map(([column, data]) => [column.toLowerCase(), { column, data }]));
   if (!lower.has("x") || !lower.has("y")) throw new Error(`the file has no columns x and y: ${names.join(", ")}`);
-  const positions = POSITIONS.filter((axis) => lower.has(axis)).map((axis) => lower.get(axis));
-  const normals = NORMALS.map((group) => group.slice(0, positions.length).map((axis) => lower.get(axis)))
-    .find((group) => group.every(Boolean));
-  const others = names.filter((column) => !positions.includes(column) && !normals?.includes(column));
+  const found = (group) => group.flatMap((axis) => lower.get(axis) ?? []);
+  const positions = found(POSITIONS);
+  const normals = NORMALS.map((group) => found(group.slice(0, positions.length))).find(
+    (group) => group.length === positions.length,
+  );
+  const used = new Set([...positions, ...(normals ?? [])].map(({ column }) => column));
   return {
     name,
-    points: interleaved(positions.map((column) => columns.get(column))),
-    normals: normals && interleaved(normals.map((column) => columns.get(column))),
-    values: new Map(others.map((column) => [column, columns.get(column)])),
+    points: interleaved(positions.map(({ data }) => data)),
+    normals: normals && interleaved(normals.map(({ data }) => data)),
+    values: new Map([...columns].filter(([column]) => !used.has(column))),
   };
 }
 
@@ -65,7 +84,8 @@ function latin(bytes) {
 function ofJson(document, name) {
   const { points, normals, values } = document.cloud ?? (Array.isArray(document) ? { points: document } : document);
   const d = points?.[0]?.length;
-  if (!Array.isArray(points) || ![2, 3].includes(d)) throw new Error("the JSON needs points: rows of two or three coordinates");
+  if (!Array.isArray(points) || ![2, 3].includes(d))
+    throw new Error("the JSON needs points: rows of two or three coordinates");
   const given = values ?? document.values;
   return {
     name,
@@ -76,7 +96,8 @@ function ofJson(document, name) {
 }
 
 function rowsOfJson(member, rows, [n, d]) {
-  if (!Array.isArray(rows) || rows.length !== n) throw new Error(`${member} are to have a row for each of the ${n} points`);
+  if (!Array.isArray(rows) || rows.length !== n)
+    throw new Error(`${member} are to have a row for each of the ${n} points`);
   const data = rows.flatMap((row, at) => numbersOfJson(`${member}[${at}]`, row, d));
   return new Tensor(Float64Array.from(data), [n, d]);
 }
@@ -91,10 +112,22 @@ function numbersOfJson(member, numbers, n) {
 
 /** Readers of a number at a place, and their sizes, by the names that PLY has for them. */
 const TYPES = {
-  char: ["getInt8", 1], int8: ["getInt8", 1], uchar: ["getUint8", 1], uint8: ["getUint8", 1],
-  short: ["getInt16", 2], int16: ["getInt16", 2], ushort: ["getUint16", 2], uint16: ["getUint16", 2],
-  int: ["getInt32", 4], int32: ["getInt32", 4], uint: ["getUint32", 4], uint32: ["getUint32", 4],
-  float: ["getFloat32", 4], float32: ["getFloat32", 4], double: ["getFloat64", 8], float64: ["getFloat64", 8],
+  char: ["getInt8", 1],
+  int8: ["getInt8", 1],
+  uchar: ["getUint8", 1],
+  uint8: ["getUint8", 1],
+  short: ["getInt16", 2],
+  int16: ["getInt16", 2],
+  ushort: ["getUint16", 2],
+  uint16: ["getUint16", 2],
+  int: ["getInt32", 4],
+  int32: ["getInt32", 4],
+  uint: ["getUint32", 4],
+  uint32: ["getUint32", 4],
+  float: ["getFloat32", 4],
+  float32: ["getFloat32", 4],
+  double: ["getFloat64", 8],
+  float64: ["getFloat64", 8],
 };
 
 function rowsOf(bytes, start, n, fields, isLittle) {
@@ -126,7 +159,9 @@ function textRows(bytes, start, n, names) {
     if (words.length !== names.length) {
       throw new Error(`line ${line} has ${words.length} numbers, but the header announces ${names.length}`);
     }
-    words.forEach((word, column) => (columns[column][row] = numberOfRow(word, line)));
+    words.forEach((word, column) => {
+      columns[column][row] = numberOfRow(word, line);
+    });
     row++;
   }
   if (row < n) throw new Error(`the file ends before its ${n} points do`);
@@ -154,7 +189,10 @@ function ply(bytes) {
   const end = start.indexOf("end_header");
   if (end < 0) throw new Error("the PLY file has no end_header");
   const body = start.indexOf("\n", end) + 1;
-  const lines = start.slice(0, end).split(/\r?\n/).map((line) => line.trim().split(/\s+/));
+  const lines = start
+    .slice(0, end)
+    .split(/\r?\n/)
+    .map((line) => line.trim().split(/\s+/));
   const format = lines.find(([word]) => word === "format")?.[1];
   const at = lines.findIndex(([word, name]) => word === "element" && name === "vertex");
   if (at < 0 || lines.slice(0, at).some(([word]) => word === "element")) {
@@ -162,20 +200,40 @@ function ply(bytes) {
   }
   const n = wholeOf(lines[at][2]);
   const last = lines.findIndex(([word], line) => line > at && word === "element");
-  const fields = lines.slice(at + 1, last < 0 ? undefined : last)
+  const fields = lines
+    .slice(at + 1, last < 0 ? undefined : last)
     .filter(([word]) => word === "property")
     .map(([, type, name]) => ({ type, name }));
   if (fields.some(({ type }) => !Object.hasOwn(TYPES, type))) throw new Error("a vertex of the PLY file has a list");
-  if (format === "ascii") return textRows(bytes, body, n, fields.map(({ name }) => name));
-  if (!Object.hasOwn(IS_LITTLE, format)) throw new Error(`the PLY file has the unknown format ${format}`);
+  if (format === "ascii")
+    return textRows(
+      bytes,
+      body,
+      n,
+      fields.map(({ name }) => name),
+    );
+  if (!format || !Object.hasOwn(IS_LITTLE, format)) throw new Error(`the PLY file has the unknown format ${format}`);
   return rowsOf(bytes, body, n, fields, IS_LITTLE[format]);
 }
 
-const PCD_TYPES = { F4: "float", F8: "double", I1: "char", I2: "short", I4: "int", U1: "uchar", U2: "ushort", U4: "uint" };
+const PCD_TYPES = {
+  F4: "float",
+  F8: "double",
+  I1: "char",
+  I2: "short",
+  I4: "int",
+  U1: "uchar",
+  U2: "ushort",
+  U4: "uint",
+};
 
 function pcd(bytes) {
   const start = latin(bytes.subarray(0, 4096));
-  const entry = (word) => start.match(new RegExp(`^${word} (.*)$`, "m"))?.[1].trim().split(/\s+/) ?? [];
+  const entry = (word) =>
+    start
+      .match(new RegExp(`^${word} (.*)$`, "m"))?.[1]
+      .trim()
+      .split(/\s+/) ?? [];
   const [names, sizes, types, counts] = ["FIELDS", "SIZE", "TYPE", "COUNT"].map(entry);
   const n = wholeOf(entry("POINTS")[0]);
   const [encoding] = entry("DATA");
@@ -189,27 +247,45 @@ function pcd(bytes) {
   return rowsOf(bytes, body, n, fields, true);
 }
 
-/** Columns without the rows of organised scans where nothing was measured, which have NaN, and the number of those. */
+/**
+ * Columns without the rows of organised scans where nothing was measured, which have NaN, and the number of
+ * those.
+ */
 function withoutGaps(columns) {
   const positions = POSITIONS.map((axis) => columns.get(axis)).filter(Boolean);
   const rows = Array.from(columns.values().next().value?.keys() ?? []);
   const kept = rows.filter((row) => positions.every((column) => Number.isFinite(column[row])));
   const nLeftOut = rows.length - kept.length;
   if (nLeftOut === 0) return { columns, nLeftOut };
-  const known = [...columns].map(([name, column]) => [name, Float64Array.from(kept, (row) => column[row])]);
-  return { columns: new Map(known), nLeftOut };
+  const known = new Map();
+  for (const [name, column] of columns)
+    known.set(
+      name,
+      Float64Array.from(kept, (row) => column[row]),
+    );
+  return { columns: known, nLeftOut };
 }
 
 function npy(bytes) {
-  const length = bytes[6] === 1 ? bytes[8] + 256 * bytes[9] : new DataView(bytes.buffer, bytes.byteOffset).getUint32(8, true);
+  const length =
+    bytes[6] === 1 ? bytes[8] + 256 * bytes[9] : new DataView(bytes.buffer, bytes.byteOffset).getUint32(8, true);
   const body = (bytes[6] === 1 ? 10 : 12) + length;
   const header = latin(bytes.subarray(10, body));
-  const shape = header.match(/'shape': \((\d+), (\d+),?\)/)?.slice(1).map(Number);
+  const shape = header
+    .match(/'shape': \((\d+), (\d+),?\)/)
+    ?.slice(1)
+    .map(Number);
   const type = { "<f8": "double", "<f4": "float" }[header.match(/'descr': '([^']*)'/)?.[1]];
   if (!shape || !type || /'fortran_order': True/.test(header)) {
     throw new Error("an npy file is to hold float32 or float64 of shape [n, d], row by row");
   }
   const [n, d] = shape;
   if (d !== 2 && d !== 3) throw new Error(`the npy file holds points in ${d} dimensions, and the page shows 2 or 3`);
-  return rowsOf(bytes, body, n, POSITIONS.slice(0, d).map((name) => ({ name, type })), true);
+  return rowsOf(
+    bytes,
+    body,
+    n,
+    POSITIONS.slice(0, d).map((name) => ({ name, type })),
+    true,
+  );
 }

@@ -1,13 +1,24 @@
+// @ts-check
 // What can be asked about a cloud, and the quantities of the answers.
 
+/** @import { Answer, Cloud, Quantity, Remedy, Settings } from "../types.d.ts" */
+/** @import { Refusal } from "./service.js" */
+
+/** @type {Record<string, { title: string, path: string, method: string }>} */
 export const OPERATIONS = {
   curvatures: { title: "Curvatures", path: "v1/curvatures", method: "curvatures" },
   normals: { title: "Normals", path: "v1/normals", method: "normals" },
   mesh: { title: "Mesh", path: "v1/level-set", method: "level_set" },
 };
 
-/** The members of a request, without its cloud. Absent ones are the service's to choose. */
+/**
+ * The members of a request, without its cloud. Absent ones are the service's to choose.
+ *
+ * @param {Settings} settings
+ * @returns {Record<string, any>}
+ */
 export function requestOf(settings) {
+  /** @type {Record<string, any>} */
   const request = {};
   const include = [];
   if (settings.deviations) include.push("deviations");
@@ -30,6 +41,7 @@ export function requestOf(settings) {
   return request;
 }
 
+/** @type {Record<string, string>} */
 const NAMES = {
   mean_curvatures: "mean curvature",
   gaussian_curvatures: "Gaussian curvature",
@@ -49,8 +61,14 @@ const OTHERS = ["vertices", "normals", "cells", "principal_directions"];
 
 const SUBSCRIPTS = ["₁", "₂", "₃"];
 
-/** Quantities that points can be coloured by, from an answer and the values of the cloud. */
+/**
+ * Quantities that points can be coloured by, from an answer and the values of the cloud.
+ *
+ * @param {Answer} answer
+ * @param {Cloud} cloud
+ */
 export function quantitiesOf(answer, cloud) {
+  /** @type {Quantity[]} */
   const of = [];
   const isMesh = "vertices" in answer.tensors;
   const n = isMesh ? answer.tensors.vertices.rows : cloud.points.rows;
@@ -92,10 +110,16 @@ function unitOf(name, d) {
   return "";
 }
 
-/** What can be done about a refusal: a label, and the settings that it sets. */
+/**
+ * What can be done about a refusal.
+ *
+ * @param {Refusal} refusal
+ * @param {Settings} settings
+ * @returns {Remedy | undefined}
+ */
 export function remedyOf({ slug, problem }, settings) {
   const pointer = problem.errors?.[0]?.pointer ?? "";
-  if (problem.minimum_alpha > 0) {
+  if (problem.minimum_alpha !== undefined && problem.minimum_alpha > 0) {
     const alpha = Number(problem.minimum_alpha.toPrecision(2));
     return { label: `Use α = ${alpha}`, set: { alpha } };
   }

@@ -1,3 +1,4 @@
+// @ts-check
 // Level regions of the function u whose level 1 is the surface, on a plane.
 
 import { Tensor } from "./tensors.js";
@@ -15,8 +16,12 @@ const HIGH = [0.05, 0.35, 0.15];
 const LINE = [0.85, 0.1, 0.1];
 
 /**
- * The plane through a cloud at right angles to an axis, at a part of the cloud's extent. Flat clouds are their own.
- * Returns the centre and two half edges.
+ * The plane through a cloud at right angles to an axis, at a part of the cloud's extent. Flat clouds are
+ * their own. Returns the centre and two half edges.
+ *
+ * @param {Tensor} points
+ * @param {number} axis
+ * @param {number} share
  */
 export function planeOf(points, axis, share) {
   const d = points.width;
@@ -34,7 +39,11 @@ export function planeOf(points, axis, share) {
   const normal = d === 2 ? 2 : axis;
   if (d === 3) centre[axis] = ranges[axis][0] + share * (ranges[axis][1] - ranges[axis][0]);
   const unit = (at) => [0, 1, 2].map((other) => (other === at ? half : 0));
-  const [first, second] = [[1, 2], [2, 0], [0, 1]][normal];
+  const [first, second] = [
+    [1, 2],
+    [2, 0],
+    [0, 1],
+  ][normal];
   return { centre, along: unit(first), up: unit(second) };
 }
 
@@ -57,6 +66,7 @@ export async function valuesOn(plane, { cloudId, points, request, used, signal }
     queries: new Tensor(queries, [WIDTH * WIDTH + n, d]),
   };
   // The function of 1 with the kernel that served the answer, and without a mean, which would be 1 itself.
+  /** @type {Record<string, any>} */
   const members = { mean: "zero" };
   for (const name of ["kernel", "alpha"]) {
     const value = request[name] ?? (used?.solver === "local" ? undefined : used?.[name]);
@@ -65,7 +75,7 @@ export async function valuesOn(plane, { cloudId, points, request, used, signal }
   if (request.duplicates) members.duplicates = request.duplicates;
   const body = { cloud: { id: cloudId }, ...members };
   const answer = await compute("v1/interpolation", body, { nPoints: 0, signal, tensors });
-  const found = answer.tensors.values.data;
+  const found = Float64Array.from(answer.tensors.values.data);
   const level = found.subarray(WIDTH * WIDTH).reduce((sum, u) => sum + u, 0) / n;
   return { values: found.subarray(0, WIDTH * WIDTH), level };
 }
@@ -74,7 +84,10 @@ export async function valuesOn(plane, { cloudId, points, request, used, signal }
 export function pixelsOf({ values, level }) {
   const pixels = new Uint8Array(4 * WIDTH * WIDTH);
   values.forEach((u, at) => {
-    const neighbours = [(at + 1) % WIDTH === 0 ? u : values[at + 1], at + WIDTH < values.length ? values[at + WIDTH] : u];
+    const neighbours = [
+      (at + 1) % WIDTH === 0 ? u : values[at + 1],
+      at + WIDTH < values.length ? values[at + WIDTH] : u,
+    ];
     const isOnSurface = neighbours.some((next) => (u - level) * (next - level) < 0);
     const share = Math.min(Math.max(0.5 + (Math.round((u - level) / STEP) * STEP) / 1.6, 0), 1);
     const colour = isOnSurface ? LINE : LOW.map((channel, of) => channel + share * (HIGH[of] - channel));

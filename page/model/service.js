@@ -1,6 +1,10 @@
+// @ts-check
 // The service: requests, jobs with progress, and refusals.
 
 import { decode, encode } from "./tensors.js";
+
+/** @import { Answer, Problem, Progress } from "../types.d.ts" */
+/** @import { Tensor } from "./tensors.js" */
 
 const TENSORS = "application/x-safetensors";
 
@@ -11,10 +15,11 @@ const KEY = "gramian-key";
 
 /** A problem document of the service. */
 export class Refusal extends Error {
+  /** @param {Problem} problem */
   constructor(problem) {
     super(problem.detail);
     this.problem = problem;
-    this.slug = String(problem.type ?? "").split("/").pop();
+    this.slug = (problem.type ?? "").replace(/^.*\//, "");
   }
 }
 
@@ -50,8 +55,16 @@ async function ask(path, options) {
   throw new Refusal({ status: response.status, ...problem });
 }
 
-/** Registers a cloud. Returns its id. */
+/**
+ * Registers a cloud. Returns its id.
+ *
+ * @param {Tensor} points
+ * @param {Tensor} [normals]
+ * @param {AbortSignal} [signal]
+ * @returns {Promise<string>}
+ */
 export async function register(points, normals, signal) {
+  /** @type {Record<string, Tensor>} */
   const tensors = normals ? { points, normals } : { points };
   const headers = { "Content-Type": TENSORS, Accept: "application/json" };
   const response = await ask("v1/clouds", { method: "POST", body: encode(tensors, {}), headers, signal });
@@ -59,8 +72,18 @@ export async function register(points, normals, signal) {
 }
 
 /**
- * Computes an answer. `follow` is called with the progress of long computations. Aborting the signal cancels the
- * computation in the service too.
+ * Computes an answer. `follow` is called with the progress of long computations. Aborting the signal cancels
+ * the computation in the service too.
+ *
+ * @param {string} path
+ * @param {object} request
+ * @param {{
+ *   nPoints: number,
+ *   signal?: AbortSignal,
+ *   follow?: (progress?: Progress) => void,
+ *   tensors?: Record<string, Tensor>,
+ * }} options
+ * @returns {Promise<Answer>}
  */
 export async function compute(path, request, { nPoints, signal, follow, tensors }) {
   const body = tensors ? encode(tensors, request) : JSON.stringify(request);
@@ -74,14 +97,26 @@ export async function compute(path, request, { nPoints, signal, follow, tensors 
   };
 }
 
-/** A file of an answer, for download. */
+/**
+ * A file of an answer, for download.
+ *
+ * @param {string} path
+ * @param {object} request
+ * @param {{ mediaType: string, nPoints: number }} options
+ */
 export async function download(path, request, { mediaType, nPoints }) {
   const headers = { "Content-Type": "application/json", Accept: mediaType };
   const found = await answered(path, { method: "POST", body: JSON.stringify(request), headers }, { nPoints });
   return new Blob([found.buffer], { type: mediaType });
 }
 
-/** Sends a request, as a job if it may take long. */
+/**
+ * Sends a request, as a job if it may take long.
+ *
+ * @param {string} path
+ * @param {RequestInit & { headers: Record<string, string> }} options
+ * @param {{ nPoints: number, follow?: (progress?: Progress) => void }} effort
+ */
 async function answered(path, options, { nPoints, follow }) {
   return nPoints < JOB_FROM ? whole(await ask(path, options)) : asJob(path, options, follow);
 }
@@ -96,7 +131,7 @@ async function asJob(path, options, follow) {
   const headers = { ...options.headers, Prefer: "respond-async" };
   const response = await ask(path, { ...options, signal: undefined, headers });
   if (response.status !== 202) return whole(response);
-  const job = `v1/jobs/${response.headers.get("Location").split("/").pop()}`;
+  const job = `v1/jobs/${response.headers.get("Location")?.split("/").pop()}`;
   try {
     signal?.throwIfAborted();
     while (!(await followed(`${job}/events`, signal, follow))) await new Promise((resume) => setTimeout(resume, 1000));
@@ -110,6 +145,7 @@ async function asJob(path, options, follow) {
 /** Reads server-sent events. Says whether the job is done; a stream may break off before. */
 async function followed(path, signal, follow) {
   const response = await ask(path, { headers: { Accept: "text/event-stream" }, signal });
+  if (!response.body) return false;
   const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
   let text = "";
   for (;;) {
@@ -117,9 +153,12 @@ async function followed(path, signal, follow) {
     if (done) return false;
     text += value;
     const events = text.split("\n\n");
-    text = events.pop();
+    text = events.pop() ?? "";
     for (const event of events) {
-      const data = event.split("\n").filter((line) => line.startsWith("data:")).map((line) => line.slice(5));
+      const data = event
+        .split("\n")
+        .filter((line) => line.startsWith("data:"))
+        .map((line) => line.slice(5));
       if (data.length > 0) follow?.(JSON.parse(data.join("\n")).progress);
       if (/^event: *done$/m.test(event)) return true;
     }
@@ -129,5 +168,7 @@ async function followed(path, signal, follow) {
 /** Milliseconds by name, from a Server-Timing header. */
 function timings(header) {
   const entries = header.split(",").map((entry) => entry.trim().match(/^([\w-]+);dur=([\d.]+)/));
-  return Object.fromEntries(entries.filter(Boolean).map(([, name, duration]) => [name, Number(duration)]));
+  return Object.fromEntries(
+    entries.filter((entry) => entry !== null).map(([, name, duration]) => [name, Number(duration)]),
+  );
 }

@@ -1,10 +1,21 @@
-// The request on screen as a command or a program. People copy and run it, so every text from a link, a file or a
-// server is quoted for its language.
+// @ts-check
+// The request on screen as a command or a program. People copy and run it, so every text from a link, a file
+// or a server is quoted for its language.
 
 import { OPERATIONS } from "./operations.js";
 
 export const LANGUAGES = { curl: "curl", python: "Python", typescript: "TypeScript" };
 
+/**
+ * @param {string} language
+ * @param {{
+ *   address: string,
+ *   cloudId?: string,
+ *   operation: string,
+ *   request: Record<string, any>,
+ *   fileName?: string,
+ * }} asked
+ */
 export function snippet(language, { address, cloudId, operation, request, fileName }) {
   const { path, method } = OPERATIONS[operation];
   const server = address.replace(/\/$/, "");
@@ -19,7 +30,9 @@ function curl(url, body) {
 }
 
 function python(server, { method, request, fileName = "scan.ply" }) {
-  const options = Object.entries(request).map(([name, value]) => `${name}=${ofPython(value)}`).join(", ");
+  const options = Object.entries(request)
+    .map(([name, value]) => `${name}=${ofPython(value)}`)
+    .join(", ");
   // The client sends PLY files as they are. Points of others are read by the program of who copies this.
   const isSent = /\.ply$/i.test(fileName);
   return [
@@ -54,16 +67,24 @@ function ofPython(value) {
   if (value === null) return "None";
   if (Array.isArray(value)) return `[${value.map(ofPython).join(", ")}]`;
   if (typeof value === "object") {
-    return `{${Object.entries(value).map(([name, entry]) => `${quoted(name)}: ${ofPython(entry)}`).join(", ")}}`;
+    return `{${Object.entries(value)
+      .map(([name, entry]) => `${quoted(name)}: ${ofPython(entry)}`)
+      .join(", ")}}`;
   }
   return quoted(value);
 }
 
-/** A value in JSON, whose strings are those of JavaScript and Python too. Characters that nobody sees are escaped. */
+/**
+ * A value in JSON, whose strings are those of JavaScript and Python too. Characters that nobody sees are
+ * escaped.
+ */
 function quoted(value) {
   return JSON.stringify(value).replace(/[\p{Cc}\p{Cf}\p{Zl}\p{Zp}]/gu, escaped);
 }
 
 function escaped(character) {
-  return Array.from({ length: character.length }, (_, at) => `\\u${character.charCodeAt(at).toString(16).padStart(4, "0")}`).join("");
+  return Array.from(
+    { length: character.length },
+    (_, at) => `\\u${character.charCodeAt(at).toString(16).padStart(4, "0")}`,
+  ).join("");
 }

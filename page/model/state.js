@@ -1,4 +1,7 @@
-// Settings of the page, kept in the link.
+// @ts-check
+// Settings of the page, kept in the link, and what else the page remembers.
+
+/** @import { PageState, Settings } from "../types.d.ts" */
 
 export const DEFAULTS = {
   example: "dragon",
@@ -33,17 +36,47 @@ export const DEFAULTS = {
 const WORDS = { colour: ["quantity", "support"] };
 
 /**
- * The words that each setting may have: the choices of the form. The quantities to colour by follow from an answer,
- * and are looked up there.
+ * The page before anything is asked.
+ *
+ * @param {Settings} settings
+ * @returns {PageState}
+ */
+export function begun(settings) {
+  return {
+    settings,
+    quantities: [],
+    reasons: new Map(),
+    reasonOf: new Map(),
+    hidden: new Set(),
+    language: "curl",
+  };
+}
+
+/**
+ * The words that each setting may have: the choices of the form. The quantities to colour by follow from an
+ * answer, and are looked up there.
+ *
+ * @param {HTMLFormElement} form
+ * @returns {Record<string, string[]>}
  */
 export function wordsOf(form) {
   const choices = [...form.querySelectorAll("select")].filter(({ name }) => name !== "quantity");
-  return { ...WORDS, ...Object.fromEntries(choices.map(({ name, options }) => [name, Array.from(options, ({ value }) => value)])) };
+  return {
+    ...WORDS,
+    ...Object.fromEntries(choices.map(({ name, options }) => [name, Array.from(options, ({ value }) => value)])),
+  };
 }
 
-/** Settings from the fragment of a link. Unknown names, unknown words and senseless numbers are passed over. */
+/**
+ * Settings from the fragment of a link. Unknown names, unknown words and senseless numbers are passed over.
+ *
+ * @param {string} hash
+ * @param {Record<string, string[]>} words
+ * @returns {Settings}
+ */
 export function fromHash(hash, words) {
   const given = new URLSearchParams(hash.replace(/^#/, ""));
+  /** @type {Record<string, any> & Settings} */
   const settings = { ...DEFAULTS };
   for (const [name, text] of given) {
     if (!Object.hasOwn(DEFAULTS, name)) continue;
@@ -55,7 +88,10 @@ export function fromHash(hash, words) {
   return settings;
 }
 
+/** @param {Settings} settings */
 export function toHash(settings) {
-  const changed = Object.entries(settings).filter(([name, value]) => name in DEFAULTS && !Object.is(value, DEFAULTS[name]));
-  return changed.length === 0 ? "" : `#${new URLSearchParams(changed)}`;
+  const changed = Object.entries(settings).filter(
+    ([name, value]) => name in DEFAULTS && !Object.is(value, DEFAULTS[name]),
+  );
+  return changed.length === 0 ? "" : `#${new URLSearchParams(changed.map(([name, value]) => [name, String(value)]))}`;
 }

@@ -1,5 +1,6 @@
-// Clouds as rows of numbers. docs/operations.md has the rules ("Rows of numbers"). src/files/table is the reader of the
-// subcommands, and tests/tables holds both to the same outcomes.
+// @ts-check
+// Clouds as rows of numbers. docs/operations.md has the rules ("Rows of numbers"). src/files/table is the
+// reader of the subcommands, and tests/tables holds both to the same outcomes.
 
 /** Decimal numbers, with a decimal point. Number() alone takes "" for 0, and hexadecimal digits. */
 const NUMBER = /^[+-]?(\d+(\.\d*)?|\.\d+)(e[+-]?\d+)?$/i;
@@ -9,11 +10,19 @@ const LIKE_THOUSANDS = /^[+-]?[1-9]\d{0,2},\d{3}$/;
 const MISSING = /^[+-]?nan$/i;
 
 /** Separators with their names, in the order in which they are looked for. */
-const SEPARATORS = new Map([[";", "semicolons"], ["\t", "tabs"], [",", "commas"], [" ", "spaces"]]);
+const SEPARATORS = new Map([
+  [";", "semicolons"],
+  ["\t", "tabs"],
+  [",", "commas"],
+  [" ", "spaces"],
+]);
 
 /** Names of the columns of positions, and of normals as programs write them. */
 export const POSITIONS = ["x", "y", "z"];
-export const NORMALS = [["nx", "ny", "nz"], ["normal_x", "normal_y", "normal_z"]];
+export const NORMALS = [
+  ["nx", "ny", "nz"],
+  ["normal_x", "normal_y", "normal_z"],
+];
 
 /** Largest deviation of the lengths of normals from 1, for two decimals of each component. */
 const MAX_DEVIATION = 0.01;
@@ -24,7 +33,12 @@ export function numberOf(text) {
   return MISSING.test(text) ? NaN : undefined;
 }
 
-/** The columns of a table by their names. */
+/**
+ * The columns of a table by their names.
+ *
+ * @param {string} text
+ * @returns {Map<string, Float64Array>}
+ */
 export function table(text) {
   const lines = contentOf(text);
   const count = takeCount(lines);
@@ -42,11 +56,16 @@ export function table(text) {
 
 /** Lines that are neither blank nor comments, with their numbers in the file. */
 function contentOf(text) {
-  return text.split(/\r?\n/).map((line, at) => ({ number: at + 1, text: line }))
+  return text
+    .split(/\r?\n/)
+    .map((line, at) => ({ number: at + 1, text: line }))
     .filter((line) => !/^[ \t]*($|#|\/\/)/.test(line.text));
 }
 
-/** Takes the number of points from the lines, if the first is one, and the comment that may follow in XYZ files. */
+/**
+ * Takes the number of points from the lines, if the first is one, and the comment that may follow in XYZ
+ * files.
+ */
 function takeCount(lines) {
   if (!/^[ \t]*\d+[ \t]*$/.test(lines[0]?.text ?? "")) return undefined;
   const { number, text } = lines.shift();
@@ -69,7 +88,9 @@ function columnsOf(rows, head, names) {
   rows.forEach((row, at) => {
     const cells = cellsOf(row.text, head.separator);
     if (cells.length !== head.width) throw new Error(head.widthRefusal(row, cells.length));
-    cells.forEach((cell, column) => (columns[column][at] = numbers.read(cell, { row, column, mayMiss: mayMiss[column] })));
+    cells.forEach((cell, column) => {
+      columns[column][at] = numbers.read(cell, { row, column, mayMiss: mayMiss[column] });
+    });
   });
   return [columns, numbers];
 }
@@ -166,14 +187,15 @@ class Numbers {
     if (cell === "") throw new Error(`${at} cell ${column + 1} is empty`);
     const hasComma = WITH_COMMA.test(cell);
     const value = numberOf(hasComma ? cell.replace(",", ".") : cell);
-    if (value === undefined || (Number.isNaN(value) && !mayMiss)) throw new Error(`${at} ${quoted(cell)} is no number${remedyOf(cell)}`);
+    if (value === undefined || (Number.isNaN(value) && !mayMiss))
+      throw new Error(`${at} ${quoted(cell)} is no number${remedyOf(cell)}`);
     if (!Number.isFinite(value) && !Number.isNaN(value)) throw new Error(`${at} ${quoted(cell)} is too large`);
-    if (hasComma) this.sawComma(cell, row, at);
+    if (hasComma) this.sawComma(cell, at);
     else if (cell.includes(".")) this.sawPoint(cell, at);
     return value;
   }
 
-  sawComma(cell, row, at) {
+  sawComma(cell, at) {
     if (this.hasPoint) throw new Error(`${at} ${quoted(cell)} has a decimal comma, numbers before it a decimal point`);
     this.withComma ??= { at, cell };
     this.areDecimal ||= !LIKE_THOUSANDS.test(cell);

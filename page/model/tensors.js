@@ -1,7 +1,12 @@
+// @ts-check
 // Requests and answers in safetensors: arrays as raw float64, everything else as JSON in the metadata.
 
 /** An array with its shape, row major. */
 export class Tensor {
+  /**
+   * @param {Float64Array | Uint32Array} data
+   * @param {number[]} shape
+   */
   constructor(data, shape) {
     this.data = data;
     this.shape = shape;
@@ -17,8 +22,14 @@ export class Tensor {
   }
 }
 
-/** The bytes of a file with float64 tensors by name, and a JSON document in the metadata entry `request`. */
+/**
+ * The bytes of a file with float64 tensors by name, and a JSON document in the metadata entry `request`.
+ *
+ * @param {Record<string, Tensor>} tensors
+ * @param {object} request
+ */
 export function encode(tensors, request) {
+  /** @type {Record<string, object>} */
   const header = { __metadata__: { request: JSON.stringify(request) } };
   let end = 0;
   for (const [name, { data, shape }] of Object.entries(tensors)) {
@@ -40,13 +51,19 @@ export function encode(tensors, request) {
   return bytes;
 }
 
-/** The tensors of an answer by name, and its other members. */
+/**
+ * The tensors of an answer by name, and its other members.
+ *
+ * @param {ArrayBuffer} buffer
+ */
 export function decode(buffer) {
   const length = Number(new DataView(buffer).getBigUint64(0, true));
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 8, length)));
   const { __metadata__: metadata, ...described } = header;
+  /** @type {Record<string, Tensor>} */
   const tensors = {};
-  for (const [name, { dtype, shape, data_offsets: [start, end] }] of Object.entries(described)) {
+  for (const [name, { dtype, shape, data_offsets: place }] of Object.entries(described)) {
+    const [start, end] = place;
     const bytes = buffer.slice(8 + length + start, 8 + length + end);
     // Whole numbers here are indices, far below 2³².
     const data = dtype === "I64" ? new Uint32Array(bytes).filter((_, at) => at % 2 === 0) : new Float64Array(bytes);

@@ -1,4 +1,7 @@
+// @ts-check
 // Colours of a value and its deviation, the same in the scene, the histogram and the colour bar.
+
+/** @import { Quantity } from "../types.d.ts" */
 
 /** Colours of values along the bar, sRGB. Diverging for signed quantities: its middle is yellow, not grey. */
 const DIVERGING = ["#27408b", "#3f7fc4", "#6fc0c9", "#e8e29a", "#efa55b", "#d5553b", "#8f1d2c"];
@@ -72,15 +75,26 @@ export function shown(x) {
   return String(Number(x.toPrecision(4))).replace("-", "−");
 }
 
+/** @type {WeakMap<ArrayLike<number>, Float64Array>} */
 const sorted = new WeakMap();
 
-/** The known numbers of an array, ascending. They are sorted once. */
+/**
+ * The known numbers of an array, ascending. They are sorted once.
+ *
+ * @param {ArrayLike<number>} values
+ */
 export function sortedOf(values) {
-  if (!sorted.has(values)) sorted.set(values, Float64Array.from(values).filter(Number.isFinite).sort());
-  return sorted.get(values);
+  const known = sorted.get(values) ?? Float64Array.from(values).filter(Number.isFinite).sort();
+  sorted.set(values, known);
+  return known;
 }
 
-/** Ends of the range of a quantity: percentiles 2 and 98 or everything, symmetric about 0 if it is signed. */
+/**
+ * Ends of the range of a quantity: percentiles 2 and 98 or everything, symmetric about 0 if it is signed.
+ *
+ * @param {Quantity} quantity
+ * @param {boolean} isWhole
+ */
 export function rangeOf({ values, isSigned }, isWhole) {
   const known = sortedOf(values);
   if (known.length === 0) return [0, 1];

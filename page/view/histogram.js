@@ -1,6 +1,9 @@
+// @ts-check
 // Histogram of a quantity over its colour bar. Both ends can be dragged, and clip.
 
 import { colourOf, cssOf, shown, sortedOf, ticks } from "./colours.js";
+
+/** @import { ColourRange, Quantity } from "../types.d.ts" */
 
 const BINS = 96;
 const BAR = 14;
@@ -8,15 +11,40 @@ const FOOT = 34;
 const SIDE = 12;
 
 export class Histogram {
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {(low: number, high: number) => void} changed
+   */
   constructor(canvas, changed) {
     this.canvas = canvas;
     this.changed = changed;
+    /** @type {Quantity | undefined} */
+    this.quantity = undefined;
+    /** @type {ColourRange} */
+    this.range = { low: 0, high: 1, full: 0, hide: Infinity, isSigned: false };
+    /**
+     * The end that is dragged.
+     * @type {"low" | "high" | undefined}
+     */
+    this.held = undefined;
+    this.bins = new Float64Array(BINS);
+    /** Ends of the bins. */
+    this.from = 0;
+    this.to = 1;
     canvas.addEventListener("pointerdown", (event) => this.grab(event));
     canvas.addEventListener("pointermove", (event) => this.drag(event));
-    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, () => (this.held = undefined));
+    for (const end of ["pointerup", "pointercancel"]) {
+      canvas.addEventListener(end, () => {
+        this.held = undefined;
+      });
+    }
     new ResizeObserver(() => this.draw()).observe(canvas);
   }
 
+  /**
+   * @param {Quantity | undefined} quantity
+   * @param {ColourRange} range
+   */
   show(quantity, range) {
     if (quantity !== this.quantity) {
       this.quantity = quantity;
@@ -80,8 +108,8 @@ export class Histogram {
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
     Object.assign(canvas, { width: width * scale, height: height * scale });
     const context = canvas.getContext("2d");
+    if (!context || !quantity || width === 0) return;
     context.scale(scale, scale);
-    if (!quantity || !range || width === 0) return;
     const ink = getComputedStyle(canvas).color;
     this.bars(context, height);
     this.bar(context, height);
@@ -103,7 +131,9 @@ export class Histogram {
     const [top, base] = [12, height - FOOT];
     const most = Math.max(...this.bins, 1);
     for (let bin = 0; bin < BINS; bin++) {
-      const [left, right] = [0, 1].map((side) => this.placeOf(this.from + ((bin + side) / BINS) * (this.to - this.from)));
+      const [left, right] = [0, 1].map((side) =>
+        this.placeOf(this.from + ((bin + side) / BINS) * (this.to - this.from)),
+      );
       const middle = this.from + ((bin + 0.5) / BINS) * (this.to - this.from);
       const tall = this.bins[bin] > 0 ? Math.max(1, Math.sqrt(this.bins[bin] / most) * (base - top)) : 0;
       context.fillStyle = this.colourAt(middle, 0);

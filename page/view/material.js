@@ -1,6 +1,14 @@
+// @ts-check
 // Shaders of points and meshes. A value and its deviation are attributes, so a change of range costs nothing.
 
-import { Color, DataTexture, DoubleSide, LinearFilter, RGBAFormat, ShaderMaterial } from "../vendor/three/three.module.min.js";
+import {
+  Color,
+  DataTexture,
+  DoubleSide,
+  LinearFilter,
+  RGBAFormat,
+  ShaderMaterial,
+} from "../vendor/three/three.module.min.js";
 import { textureOf } from "./colours.js";
 
 const VERTEX = `
@@ -44,9 +52,18 @@ const FRAGMENT = `
 /** A material for points or triangles that are coloured by a quantity. */
 export function quantityMaterial(isPoint) {
   const uniforms = {
-    low: { value: 0 }, high: { value: 1 }, full: { value: 0 }, hide: { value: Infinity },
-    size: { value: 0.02 }, height: { value: 600 }, isFlat: { value: false }, isPoint: { value: isPoint }, hasLines: { value: false },
-    isPlain: { value: 0 }, plain: { value: new Color(0.55, 0.6, 0.68) }, colours: { value: null },
+    low: { value: 0 },
+    high: { value: 1 },
+    full: { value: 0 },
+    hide: { value: Infinity },
+    size: { value: 0.02 },
+    height: { value: 600 },
+    isFlat: { value: false },
+    isPoint: { value: isPoint },
+    hasLines: { value: false },
+    isPlain: { value: 0 },
+    plain: { value: new Color(0.55, 0.6, 0.68) },
+    colours: { value: null },
   };
   return new ShaderMaterial({ uniforms, vertexShader: VERTEX, fragmentShader: FRAGMENT, side: DoubleSide });
 }

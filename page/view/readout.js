@@ -1,7 +1,13 @@
-// What the picture says in words and numbers: summary, marks by reason, the point under the pointer, diagnostics.
+// @ts-check
+// What the picture says in words and numbers: summary, marks by reason, the point under the pointer,
+// diagnostics.
 
 import { SUPPORT, cssOf, shown } from "./colours.js";
 
+/** @import { Answer, Cloud, ColourRange, Marks, PageState } from "../types.d.ts" */
+/** @import { Quantity, Remedy, Settings } from "../types.d.ts" */
+
+/** @type {Record<string, string>} */
 const REASONS = {
   vanishing_gradient: "the function has no gradient",
   unaffordable_rescue: "too many points without a gradient",
@@ -13,20 +19,41 @@ const REASONS = {
 };
 
 /** Colours of marks, none of which the scales have. */
-const MARKS = [[0.85, 0.1, 0.75], [0.1, 0.1, 0.1], [0.95, 0.45, 0], [0, 0.5, 0.2], [0.3, 0.2, 0.8], [0.6, 0.4, 0.2], [0.9, 0.2, 0.2]];
+const MARKS = [
+  [0.85, 0.1, 0.75],
+  [0.1, 0.1, 0.1],
+  [0.95, 0.45, 0],
+  [0, 0.5, 0.2],
+  [0.3, 0.2, 0.8],
+  [0.6, 0.4, 0.2],
+  [0.9, 0.2, 0.2],
+];
 
-export const element = (name, properties = {}, ...children) => {
-  const made = Object.assign(document.createElement(name), properties);
+/**
+ * @template {keyof HTMLElementTagNameMap} Name
+ * @param {Name} name
+ * @param {Partial<HTMLElementTagNameMap[Name]>} properties
+ * @param {...(Node | string)} children
+ */
+export function element(name, properties = {}, ...children) {
+  const made = document.createElement(name);
+  Object.assign(made, properties);
   made.append(...children);
   return made;
-};
+}
 
-/** Points without an answer, or with a doubtful one, by reason. */
+/**
+ * Points without an answer, or with a doubtful one, by reason.
+ *
+ * @param {Answer} answer
+ * @returns {Map<string, Marks>}
+ */
 export function markedOf(answer) {
   const reasons = new Map();
   for (const { query, reason } of answer.fields.degenerate ?? []) {
-    if (!reasons.has(reason)) reasons.set(reason, { points: [], colour: MARKS[reasons.size % MARKS.length] });
-    reasons.get(reason).points.push(query);
+    const marks = reasons.get(reason) ?? { points: [], colour: MARKS[reasons.size % MARKS.length] };
+    marks.points.push(query);
+    reasons.set(reason, marks);
   }
   return reasons;
 }
@@ -35,18 +62,42 @@ export function words(reason) {
   return REASONS[reason] ?? reason.replaceAll("_", " ");
 }
 
-/** Check boxes for the marks of each reason. */
+/**
+ * Check boxes for the marks of each reason.
+ *
+ * @param {HTMLElement} into
+ * @param {Map<string, Marks>} reasons
+ * @param {(reason: string, isShown: boolean) => void} changed
+ */
 export function showMarks(into, reasons, changed) {
-  into.replaceChildren(...[...reasons].map(([reason, { points, colour }]) => {
-    const box = element("input", { type: "checkbox", checked: true });
-    box.addEventListener("change", () => changed(reason, box.checked));
-    const swatch = element("span", { className: "swatch" });
-    swatch.style.color = cssOf(colour);
-    return element("label", { className: "check" }, box, swatch, `${points.length.toLocaleString("en")} ${words(reason)}`);
-  }));
+  into.replaceChildren(
+    ...[...reasons].map(([reason, { points, colour }]) => {
+      const box = element("input", { type: "checkbox", checked: true });
+      box.addEventListener("change", () => changed(reason, box.checked));
+      const swatch = element("span", { className: "swatch" });
+      swatch.style.color = cssOf(colour);
+      return element(
+        "label",
+        { className: "check" },
+        box,
+        swatch,
+        `${points.length.toLocaleString("en")} ${words(reason)}`,
+      );
+    }),
+  );
 }
 
-/** One sentence for everyone, and for screen readers. */
+/**
+ * One sentence for everyone, and for screen readers.
+ *
+ * @param {{
+ *   answer: Answer,
+ *   cloud: Cloud,
+ *   quantity?: Quantity,
+ *   range: ColourRange,
+ *   reasons: Map<string, Marks>,
+ * }} shown
+ */
 export function summaryOf({ answer, cloud, quantity, range, reasons }) {
   const n = (answer.tensors.vertices ?? cloud.points).rows.toLocaleString("en");
   const what = answer.tensors.vertices ? "vertices" : "points";
@@ -61,16 +112,27 @@ export function summaryOf({ answer, cloud, quantity, range, reasons }) {
   return `${parts.join("; ")}.`;
 }
 
-/** Value and deviation at a point. */
+/**
+ * Value and deviation at a point.
+ *
+ * @param {Quantity | undefined} quantity
+ * @param {number} point
+ */
 export function valueAt(quantity, point) {
   if (!quantity) return "";
   const deviation = quantity.deviations?.[point];
-  const known = Number.isFinite(deviation) ? ` ± ${shown(deviation)}` : "";
+  const known = deviation !== undefined && Number.isFinite(deviation) ? ` ± ${shown(deviation)}` : "";
   return `${shown(quantity.values[point])}${known} ${quantity.unit}`.trim();
 }
 
-/** Everything that is known of a point. */
-export function showPinned(into, { point, quantities, answer, cloud, reasons }) {
+/**
+ * Everything that is known of a point.
+ *
+ * @param {HTMLElement} into
+ * @param {number} point
+ * @param {PageState & { answer: Answer, cloud: Cloud }} page
+ */
+export function showPinned(into, point, { quantities, answer, cloud, reasons }) {
   const positions = answer.tensors.vertices ?? cloud.points;
   const d = positions.width;
   const position = [...positions.data.subarray(point * d, (point + 1) * d)].map(shown).join(", ");
@@ -78,17 +140,22 @@ export function showPinned(into, { point, quantities, answer, cloud, reasons }) 
   rows.push(...quantities.filter(({ id }) => !id.includes("deviation")).map((of) => [of.title, valueAt(of, point)]));
   if (answer.fields.support) rows.push(["rests on", answer.fields.support[point]]);
   for (const [reason, { points }] of reasons) if (points.includes(point)) rows.push(["marked", words(reason)]);
-  const close = element("button", { type: "button", textContent: "Close" });
-  close.addEventListener("click", () => (into.hidden = true));
-  into.replaceChildren(element("strong", { textContent: `Point ${point}` }), list(rows), close);
+  into.replaceChildren(element("strong", { textContent: `Point ${point}` }), list(rows), closing(into));
   into.hidden = false;
 }
 
 function list(rows) {
-  const entries = rows.flatMap(([name, text]) => [element("dt", { textContent: name }), element("dd", { textContent: text })]);
+  const entries = rows.flatMap(([name, text]) => [
+    element("dt", { textContent: name }),
+    element("dd", { textContent: text }),
+  ]);
   return element("dl", {}, ...entries);
 }
 
+/**
+ * @param {HTMLElement} into
+ * @param {Answer} answer
+ */
 export function showSupport(into, answer) {
   const support = answer.fields.support;
   if (!support) return;
@@ -101,34 +168,66 @@ export function showSupport(into, answer) {
   into.replaceChildren(...counts);
 }
 
+/**
+ * @param {HTMLElement} into
+ * @param {Answer} answer
+ */
 export function showDiagnostics(into, answer) {
   const used = answer.fields.diagnostics ?? {};
   const kernel = used.kernel ?? {};
   const timing = answer.timing ?? {};
+  const reciprocal = used.reciprocal_condition ?? 0;
   const rows = [
     ["solver", used.solver],
-    ["kernel", Object.entries(kernel).map(([name, value]) => `${name} ${typeof value === "number" ? shown(value) : value}`).join(", ")],
+    [
+      "kernel",
+      Object.entries(kernel)
+        .map(([name, value]) => `${name} ${typeof value === "number" ? shown(value) : value}`)
+        .join(", "),
+    ],
     ["α", used.alpha === undefined ? undefined : shown(used.alpha)],
-    ["condition", used.reciprocal_condition > 0 ? shown(1 / used.reciprocal_condition) : undefined],
-    ["sides found", answer.fields.closedness === undefined ? undefined : `${(100 * answer.fields.closedness).toFixed(1)} %`],
+    ["condition", reciprocal > 0 ? shown(1 / reciprocal) : undefined],
+    [
+      "sides found",
+      answer.fields.closedness === undefined ? undefined : `${(100 * answer.fields.closedness).toFixed(1)} %`,
+    ],
     ["time", answer.seconds === undefined ? "computed when the page was made" : `${answer.seconds.toFixed(2)} s`],
-    ...Object.entries(timing).map(([name, duration]) => [`of it ${name}`, name === "factor" && duration === 0 ? "cached" : `${duration} ms`]),
+    ...Object.entries(timing).map(([name, duration]) => [
+      `of it ${name}`,
+      name === "factor" && duration === 0 ? "cached" : `${duration} ms`,
+    ]),
   ];
   const known = rows.filter(([, text]) => text !== undefined && text !== "");
   into.replaceChildren(...list(known).children);
 }
 
-/** A refusal with its remedy as a button. */
-export function showRefusal(into, { title, detail, remedy, apply }) {
+/**
+ * A refusal with its remedy as a button, which calls `apply`.
+ *
+ * @param {HTMLElement} into
+ * @param {{ title: string, detail: string, remedy?: Remedy }} refusal
+ * @param {(settings: Partial<Settings>) => void} [apply]
+ */
+export function showRefusal(into, { title, detail, remedy }, apply) {
   const buttons = element("div", { className: "buttons" });
   if (remedy) {
     const button = element("button", { type: "button", textContent: remedy.label });
-    button.addEventListener("click", () => ((into.hidden = true), apply(remedy.set)));
+    button.addEventListener("click", () => {
+      into.hidden = true;
+      apply?.(remedy.set);
+    });
     buttons.append(button);
   }
-  const close = element("button", { type: "button", textContent: "Close" });
-  close.addEventListener("click", () => (into.hidden = true));
-  buttons.append(close);
+  buttons.append(closing(into));
   into.replaceChildren(element("h2", { textContent: title }), element("p", { textContent: detail }), buttons);
   into.hidden = false;
+}
+
+/** A button that hides an element. */
+function closing(what) {
+  const button = element("button", { type: "button", textContent: "Close" });
+  button.addEventListener("click", () => {
+    what.hidden = true;
+  });
+  return button;
 }

@@ -1,13 +1,35 @@
+// @ts-check
 // The picture: points or a mesh, marks, arrows, and a cross-section.
 
 import {
-  Box3, BufferAttribute, BufferGeometry, Color, DataTexture, DoubleSide, Group, Line, LineBasicMaterial, LineSegments, Mesh,
-  MeshBasicMaterial, OrthographicCamera, PerspectiveCamera, PlaneGeometry, Points, RGBAFormat, Scene as Graph, Sphere,
-  SRGBColorSpace,  Vector3, WebGLRenderer,
+  Box3,
+  BufferAttribute,
+  BufferGeometry,
+  Color,
+  DataTexture,
+  DoubleSide,
+  Group,
+  Line,
+  LineBasicMaterial,
+  LineSegments,
+  Mesh,
+  MeshBasicMaterial,
+  OrthographicCamera,
+  PerspectiveCamera,
+  PlaneGeometry,
+  Points,
+  RGBAFormat,
+  Scene as Graph,
+  Sphere,
+  SRGBColorSpace,
+  Vector3,
+  WebGLRenderer,
 } from "../vendor/three/three.module.min.js";
 import { OrbitControls } from "../vendor/three/OrbitControls.js";
 import { uniform } from "../model/examples.js";
 import { colours, quantityMaterial, ringMaterial } from "./material.js";
+
+/** @import { ColourRange } from "../types.d.ts" */
 
 /** Points drawn while the view moves. All are drawn once it stands still. */
 const MOVING = 150_000;
@@ -20,29 +42,65 @@ const UNKNOWN = -1e30;
 const UPRIGHT = new Vector3(0, 1, 0);
 
 export class Scene {
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {() => void} changed
+   */
   constructor(canvas, changed) {
     this.canvas = canvas;
+    /** The element that the canvas fills. */
+    this.frame = canvas.parentElement ?? canvas;
     this.changed = changed;
     this.renderer = new WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     this.graph = new Graph();
     this.perspective = new PerspectiveCamera(40, 1, 0.01, 100);
     this.orthographic = new OrthographicCamera(-1, 1, 1, -1, 0.01, 100);
+    /** @type {PerspectiveCamera | OrthographicCamera} */
     this.camera = this.perspective;
     this.controls = new OrbitControls(this.camera, canvas);
-    this.controls.addEventListener("start", () => (this.isMoving = true));
-    this.controls.addEventListener("end", () => ((this.isMoving = false), this.draw()));
+    this.controls.addEventListener("start", () => {
+      this.isMoving = true;
+    });
+    this.controls.addEventListener("end", () => {
+      this.isMoving = false;
+      this.draw();
+    });
     this.controls.addEventListener("change", () => this.draw());
     this.extras = new Group();
     this.graph.add(this.extras);
+    this.isMoving = false;
     this.radius = 1;
+    this.spacing = 1;
+    this.dot = 1;
+    this.n = 0;
+    this.dimension = 3;
+    /** Positions of what is drawn, about the middle. */
+    this.placed = new Float32Array();
+    this.middle = [0, 0, 0];
+    /**
+     * The point of the cloud at each place that is drawn, where they are shuffled.
+     * @type {Uint32Array | undefined}
+     */
+    this.order = undefined;
+    /** @type {Points | Mesh | undefined} */
+    this.object = undefined;
+    this.material = quantityMaterial(true);
+    /** The range that the values in the buffers are relative to. */
+    this.low = 0;
+    this.high = 1;
+    /**
+     * The frame that is waited for.
+     * @type {number | undefined}
+     */
+    this.awaited = undefined;
     this.scales = { signed: colours(true), plain: colours(false) };
-    new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
+    new ResizeObserver(() => this.resize()).observe(this.frame);
   }
 
   /**
-   * Shows points, or a mesh if there are cells. Positions are relative to their middle, since the graphics processor
-   * has 32 bits.
+   * Shows points, or a mesh if there are cells. Positions are relative to their middle, since the graphics
+   * processor has 32 bits.
    */
   show({ positions, cells, normals, nearby }) {
     const [n, d] = positions.shape;
@@ -62,7 +120,8 @@ export class Scene {
       }
     });
     const geometry = new BufferGeometry();
-    geometry.setAttribute("position", new BufferAttribute(this.placed, 3));
+    const placed = new BufferAttribute(this.placed, 3);
+    geometry.setAttribute("position", placed);
     geometry.setAttribute("normal", new BufferAttribute(turned, 3));
     geometry.setAttribute("value", new BufferAttribute(new Float32Array(n), 1));
     geometry.setAttribute("deviation", new BufferAttribute(new Float32Array(n), 1));
@@ -72,20 +131,27 @@ export class Scene {
     this.object = isPoint ? new Points(geometry, this.material) : new Mesh(geometry, this.material);
     this.object.frustumCulled = false;
     this.graph.add(this.object);
-    this.radius = new Box3().setFromBufferAttribute(geometry.attributes.position).getBoundingSphere(new Sphere()).radius || 1;
-    this.spacing = d === 2 ? (6 * this.radius) / nearby : 2.4 * this.radius / Math.sqrt(nearby);
+    this.radius = new Box3().setFromBufferAttribute(placed).getBoundingSphere(new Sphere()).radius || 1;
+    this.spacing = d === 2 ? (6 * this.radius) / nearby : (2.4 * this.radius) / Math.sqrt(nearby);
     // Dots on a curve would hide it if they touched.
     this.dot = (d === 2 ? 0.4 : 0.85) * this.spacing;
     this.material.uniforms.size.value = this.dot;
     this.material.uniforms.isFlat.value = d === 2 || !normals;
-    if (cells && d === 2) this.object.add(this.lines(cells.data, 0x8899aa));
+    if (cells && d === 2) this.object.add(lines(geometry, cells.data, 0x8899aa));
     this.resize();
   }
 
-  /** Colours by a quantity, or not at all. */
+  /**
+   * Colours by a quantity, or not at all.
+   *
+   * @param {{ values: ArrayLike<number>, deviations?: ArrayLike<number> } | undefined} quantity
+   * @param {ColourRange} range
+   */
   colour(quantity, { low, high, hide, full, isSigned, hasLines }) {
+    if (!this.object) return;
     const { value, deviation } = this.object.geometry.attributes;
-    [this.low, this.high] = [low, high];
+    this.low = low;
+    this.high = high;
     const source = (at) => (this.order ? this.order[at] : at);
     for (let at = 0; at < this.n; at++) {
       // Relative to the range, since these have 32 bits. What is not known has numbers of its own.
@@ -123,7 +189,9 @@ export class Scene {
     material.uniforms.size.value = 0.6 * this.dot;
     const places = new Float32Array(3 * points.length);
     const at = this.placeOf();
-    points.forEach((point, row) => places.set(this.placed.subarray(3 * at(point), 3 * at(point) + 3), 3 * row));
+    points.forEach((point, row) => {
+      places.set(this.placed.subarray(3 * at(point), 3 * at(point) + 3), 3 * row);
+    });
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new BufferAttribute(places, 3));
     const marks = new Points(geometry, material);
@@ -136,11 +204,13 @@ export class Scene {
   placeOf() {
     if (!this.order) return (point) => point;
     const at = new Uint32Array(this.n);
-    this.order.forEach((point, place) => (at[point] = place));
+    for (const [place, point] of this.order.entries()) at[point] = place;
     return (point) => at[point];
   }
 
-  /** Arrows along vectors `[n, …]` at points, `from` the vector's part of each row, both ways for directions. */
+  /**
+   * Arrows along vectors `[n, …]` at points, `from` the vector's part of each row, both ways for directions.
+   */
   arrows(tensor, { offset = 0, isBothWays = false, colour = 0x4477aa } = {}) {
     const d = this.dimension;
     const every = Math.max(1, Math.ceil(this.n / MAX_ARROWS));
@@ -151,7 +221,10 @@ export class Scene {
       const along = Array.from({ length: 3 }, (_, axis) => (axis < d ? length * tensor.data[row + axis] : 0));
       if (!along.every(Number.isFinite)) continue;
       const place = this.placed.subarray(3 * at, 3 * at + 3);
-      ends.push(...along.map((c, axis) => place[axis] - (isBothWays ? c : 0)), ...along.map((c, axis) => place[axis] + c));
+      ends.push(
+        ...along.map((c, axis) => place[axis] - (isBothWays ? c : 0)),
+        ...along.map((c, axis) => place[axis] + c),
+      );
     }
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new BufferAttribute(Float32Array.from(ends), 3));
@@ -166,13 +239,6 @@ export class Scene {
     geometry.setAttribute("position", new BufferAttribute(Float32Array.from(places), 3));
     this.extras.add(new Line(geometry, new LineBasicMaterial({ color: colour })));
     this.draw();
-  }
-
-  lines(cells, colour) {
-    const geometry = new BufferGeometry();
-    geometry.setAttribute("position", this.object.geometry.attributes.position);
-    geometry.setIndex(new BufferAttribute(Uint32Array.from(cells), 1));
-    return new LineSegments(geometry, new LineBasicMaterial({ color: colour }));
   }
 
   /** Shows a square picture on a plane: pixels of width × width, spanned by two half edges about a centre. */
@@ -228,7 +294,7 @@ export class Scene {
   }
 
   resize() {
-    const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
+    const { clientWidth: width, clientHeight: height } = this.frame;
     if (width === 0 || height === 0) return;
     this.renderer.setSize(width, height, false);
     const [near, far, half] = [0.005 * this.radius, 30 * this.radius, 1.1 * this.radius];
@@ -236,9 +302,11 @@ export class Scene {
     const [across, up] = aspect > 1 ? [half * aspect, half] : [half, half / aspect];
     Object.assign(this.perspective, { aspect, near, far });
     Object.assign(this.orthographic, { left: -across, right: across, top: up, bottom: -up, near, far });
-    [this.perspective, this.orthographic].forEach((camera) => camera.updateProjectionMatrix());
+    for (const camera of [this.perspective, this.orthographic]) camera.updateProjectionMatrix();
     const pixels = 0.5 * height * this.renderer.getPixelRatio();
-    this.graph.traverse(({ material }) => material?.uniforms?.height && (material.uniforms.height.value = pixels));
+    this.graph.traverse((/** @type {any} */ { material }) => {
+      if (material?.uniforms?.height) material.uniforms.height.value = pixels;
+    });
     this.draw();
   }
 
@@ -249,8 +317,8 @@ export class Scene {
 
   /** Draws in the next frame, once however often it is asked. */
   draw() {
-    this.frame ??= requestAnimationFrame(() => {
-      this.frame = undefined;
+    this.awaited ??= requestAnimationFrame(() => {
+      this.awaited = undefined;
       this.render();
     });
   }
@@ -269,14 +337,18 @@ export class Scene {
     const elements = this.camera.projectionMatrix.clone().multiply(this.camera.matrixWorldInverse).elements;
     const { clientWidth: width, clientHeight: height } = this.canvas;
     const reach = 10;
-    let [found, depth] = [undefined, Infinity];
+    /** @type {number | undefined} */
+    let found;
+    let depth = Infinity;
     for (let at = 0; at < this.n; at++) {
       const [a, b, c] = [this.placed[3 * at], this.placed[3 * at + 1], this.placed[3 * at + 2]];
       const w = elements[3] * a + elements[7] * b + elements[11] * c + elements[15];
       if (w <= 0) continue;
-      const across = (0.5 + (0.5 * (elements[0] * a + elements[4] * b + elements[8] * c + elements[12])) / w) * width - x;
+      const across =
+        (0.5 + (0.5 * (elements[0] * a + elements[4] * b + elements[8] * c + elements[12])) / w) * width - x;
       if (Math.abs(across) > reach) continue;
-      const down = (0.5 - (0.5 * (elements[1] * a + elements[5] * b + elements[9] * c + elements[13])) / w) * height - y;
+      const down =
+        (0.5 - (0.5 * (elements[1] * a + elements[5] * b + elements[9] * c + elements[13])) / w) * height - y;
       if (Math.abs(down) > reach) continue;
       const z = (elements[2] * a + elements[6] * b + elements[10] * c + elements[14]) / w;
       // A point a little behind but nearer to the pointer is the one that is meant.
@@ -314,8 +386,19 @@ export class Scene {
   }
 }
 
+/** Lines between points of a geometry. */
+function lines(points, cells, colour) {
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", points.attributes.position);
+  geometry.setIndex(new BufferAttribute(Uint32Array.from(cells), 1));
+  return new LineSegments(geometry, new LineBasicMaterial({ color: colour }));
+}
+
 function middleOf({ data, shape: [n, d] }) {
-  const [least, greatest] = [[0, 0, 0], [0, 0, 0]];
+  const [least, greatest] = [
+    [0, 0, 0],
+    [0, 0, 0],
+  ];
   for (let axis = 0; axis < d; axis++) [least[axis], greatest[axis]] = [Infinity, -Infinity];
   for (let row = 0; row < n; row++) {
     for (let axis = 0; axis < d; axis++) {

@@ -11,8 +11,8 @@ public static class Scenario
 {
     private const string CloudId = "bd711900da5366ee5d24b56f902cd7e737e487987d5285c2791b2955e124c69c";
 
-    // An alpha that the answers do not feel: the client leaves out numbers that are 0, and what is left out is chosen by
-    // the service.
+    // An alpha that the answers do not feel: the client leaves out numbers that are 0, and what is left out
+    // is chosen by the service.
     private const double Alpha = 1e-14;
 
     private static readonly string Url = Environment.GetEnvironmentVariable("GRAMIAN_URL");
@@ -73,8 +73,8 @@ public static class Scenario
         for (var i = 0; i < matrix.Count; i++)
         {
             // Eight points on the circle take a wave of frequency 7 for a cosine, which adds the fraction
-            // 48 I_7(1/2)/I_1(1/2) = 2.3e-6. The Bessel functions I_k are the Fourier coefficients of this kernel on the
-            // circle, up to a factor.
+            // 48 I_7(1/2)/I_1(1/2) = 2.3e-6. The Bessel functions I_k are the Fourier coefficients of this
+            // kernel on the circle, up to a factor.
             var applied = Dot(matrix[i], Cosines);
             Check(Math.Abs(applied + Cosines[i]) < 5e-6, $"row {i}: {applied}");
         }

@@ -103,8 +103,8 @@ func theMatrixNegatesCosines(t *testing.T, client *gramian.APIClient) {
 	for i, row := range answer.Matrix {
 		applied := dot(*row, cosines())
 		// Eight points on the circle take a wave of frequency 7 for a cosine, which adds the fraction
-		// 48 I_7(1/2)/I_1(1/2) = 2.3e-6. The Bessel functions I_k are the Fourier coefficients of this kernel on the
-		// circle, up to a factor.
+		// 48 I_7(1/2)/I_1(1/2) = 2.3e-6. The Bessel functions I_k are the Fourier coefficients of this kernel on
+		// the circle, up to a factor.
 		if math.Abs(applied+points[i][0]) > 5e-6 {
 			t.Errorf("row %d: %g for the cosine %g", i, applied, points[i][0])
 		}

@@ -50,7 +50,8 @@ public class Scenario {
     }
 
     private void normalsPointOutward() throws ApiException {
-        // Without an id, as the first request of a newcomer: normals and variances of the noise are sent empty.
+        // Without an id, as the first request of a newcomer: normals and variances of the noise are sent
+        // empty.
         CloudRef inline = new CloudRef().points(POINTS);
         NormalsRequest request = new NormalsRequest().cloud(inline).queries(POINTS).kernel(gauss(2.0)).alpha(0.0);
         List<List<Double>> normals = geometry.computeNormals(request).getNormals();
@@ -76,8 +77,8 @@ public class Scenario {
         check(matrix.size() == POINTS.size(), matrix);
         for (int i = 0; i < matrix.size(); i++) {
             // Eight points on the circle take a wave of frequency 7 for a cosine, which adds the fraction
-            // 48 I_7(1/2)/I_1(1/2) = 2.3e-6. The Bessel functions I_k are the Fourier coefficients of this kernel on
-            // the circle, up to a factor.
+            // 48 I_7(1/2)/I_1(1/2) = 2.3e-6. The Bessel functions I_k are the Fourier coefficients of this
+            // kernel on the circle, up to a factor.
             double applied = dot(matrix.get(i), COSINES);
             check(Math.abs(applied + COSINES.get(i)) < 5e-6, "row " + i + ": " + applied);
         }

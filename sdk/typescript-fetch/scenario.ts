@@ -16,8 +16,14 @@ import {
 
 // Eight points of the unit circle.
 const points = [
-    [1, 0], [0.70710678, 0.70710678], [0, 1], [-0.70710678, 0.70710678],
-    [-1, 0], [-0.70710678, -0.70710678], [0, -1], [0.70710678, -0.70710678],
+    [1, 0],
+    [0.70710678, 0.70710678],
+    [0, 1],
+    [-0.70710678, 0.70710678],
+    [-1, 0],
+    [-0.70710678, -0.70710678],
+    [0, -1],
+    [0.70710678, -0.70710678],
 ];
 const cosines = points.map(([x = NaN]) => x);
 const gauss: Kernel = { family: KernelFamily.Gauss, lengthScale: 2 };
@@ -44,12 +50,22 @@ async function theCloudIsListed() {
 
 async function normalsPointOutward() {
     const { normals } = await geometry.computeNormals({ normalsRequest: { cloud, kernel: gauss, alpha: 0 } });
-    normals.forEach((normal, i) => assert.ok(dot(normal ?? [], points[i] ?? []) > 0.999, `${i}: ${normal}`));
+    for (const [i, normal] of normals.entries()) {
+        assert.ok(dot(normal ?? [], points[i] ?? []) > 0.999, `${i}: ${normal}`);
+    }
     assert.equal(normals.length, 8);
 }
 
 async function curvaturesAreNullAtTheCentre() {
-    const curvaturesRequest = { cloud, queries: [[1, 0], [0, 0]], kernel: gauss, alpha: 0 };
+    const curvaturesRequest = {
+        cloud,
+        queries: [
+            [1, 0],
+            [0, 0],
+        ],
+        kernel: gauss,
+        alpha: 0,
+    };
     const { meanCurvatures, degenerate } = await geometry.computeCurvatures({ curvaturesRequest });
     const [onTheCircle, atTheCentre] = meanCurvatures;
     assert.ok(Math.abs((onTheCircle ?? NaN) - 1) < 1e-6, `${onTheCircle}`);
@@ -95,7 +111,10 @@ async function aCloudIsDeletedOnce() {
 }
 
 async function refusal(call: Promise<unknown>, status: number): Promise<Problem> {
-    const error = await call.then(() => assert.fail("this should be refused"), (reason: unknown) => reason);
+    const error = await call.then(
+        () => assert.fail("this should be refused"),
+        (reason: unknown) => reason,
+    );
     assert.ok(error instanceof ResponseError, `${error}`);
     assert.equal(error.response.status, status);
     return error.response.json();

@@ -14,8 +14,14 @@ import {
 
 // Eight points of the unit circle.
 const points = [
-    [1, 0], [0.70710678, 0.70710678], [0, 1], [-0.70710678, 0.70710678],
-    [-1, 0], [-0.70710678, -0.70710678], [0, -1], [0.70710678, -0.70710678],
+    [1, 0],
+    [0.70710678, 0.70710678],
+    [0, 1],
+    [-0.70710678, 0.70710678],
+    [-1, 0],
+    [-0.70710678, -0.70710678],
+    [0, -1],
+    [0.70710678, -0.70710678],
 ];
 const cosines = points.map(([x = NaN]) => x);
 const gauss: Kernel = { family: KernelFamily.GAUSS, length_scale: 2 };
@@ -31,7 +37,10 @@ await thePosteriorHasAVariance();
 await aRefusalNamesTheField();
 
 async function curvaturesAreNullAtTheCentre() {
-    const queries = [[1, 0], [0, 0]];
+    const queries = [
+        [1, 0],
+        [0, 0],
+    ];
     const body = { cloud, queries, kernel: gauss, alpha: 0 };
     const { data } = await computeCurvatures({ body, throwOnError: true });
     const [onTheCircle, atTheCentre] = data.mean_curvatures;

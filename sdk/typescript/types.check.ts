@@ -1,7 +1,7 @@
-// Compares the generated types with the document. Every property, parameter, body and answer must have exactly the type
-// that its schema asks for: so there is no `any` or `unknown`, no anonymous object, and null where the document allows
-// it and nowhere else. Enumerations must be objects of their values. One answer is `unknown`: that of a job, whose type is
-// that of the answer to its request.
+// Compares the generated types with the document. Every property, parameter, body and answer must have
+// exactly the type that its schema asks for: so there is no `any` or `unknown`, no anonymous object, and null
+// where the document allows it and nowhere else. Enumerations must be objects of their values. One answer is
+// `unknown`: that of a job, whose type is that of the answer to its request.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import ts from "typescript";

@@ -1,4 +1,6 @@
-// The page in a real browser: pictures by their pixels, files, parameters, refusals, cancelling, sizes, rules.
+// @ts-check
+// The page in a real browser: pictures by their pixels, files, parameters, refusals, cancelling, sizes,
+// rules.
 //
 // Asks the server at GRAMIAN_URL. Screenshots are left in target/page.
 
@@ -30,7 +32,13 @@ before(async () => {
 });
 after(() => browser.close());
 
-/** Opens the page and calls `use`. Nothing may be logged as an error, asked of others, or against the policy. */
+/**
+ * Opens the page and calls `use`. Nothing may be logged as an error, asked of others, or against the policy.
+ *
+ * @param {string} hash
+ * @param {(page: import("playwright-core").Page) => Promise<void>} use
+ * @param {import("playwright-core").BrowserContextOptions & { expected?: string[] }} options
+ */
 async function opened(hash, use, { viewport = DESK, expected = [], ...options } = {}) {
   const context = await browser.newContext({ viewport, ...options });
   const page = await context.newPage();
@@ -57,6 +65,14 @@ function settled(page) {
   return page.waitForSelector("body[data-state=settled]", { timeout: 120_000 });
 }
 
+/**
+ * @param {import("playwright-core").Page} page
+ * @param {string} selector
+ */
+async function textOf(page, selector) {
+  return (await page.textContent(selector)) ?? "";
+}
+
 /** Number of different colours in the picture, in a coarse raster. */
 async function nColours(page, name) {
   await page.waitForTimeout(0);
@@ -66,10 +82,12 @@ async function nColours(page, name) {
     const image = await createImageBitmap(new Blob([bytes]));
     const canvas = new OffscreenCanvas(image.width, image.height);
     const context = canvas.getContext("2d");
+    if (!context) throw new Error("no canvas");
     context.drawImage(image, 0, 0);
     const { data } = context.getImageData(0, 0, image.width, image.height);
     const colours = new Set();
-    for (let at = 0; at < data.length; at += 4) colours.add((data[at] >> 4) * 256 + (data[at + 1] >> 4) * 16 + (data[at + 2] >> 4));
+    for (let at = 0; at < data.length; at += 4)
+      colours.add((data[at] >> 4) * 256 + (data[at + 1] >> 4) * 16 + (data[at + 2] >> 4));
     return colours.size;
   }, png.toString("base64"));
 }
@@ -86,7 +104,7 @@ function sphere(n) {
 
 async function open(page, name, text) {
   await page.setInputFiles("#file", { name, mimeType: "text/plain", buffer: Buffer.from(text) });
-  await page.waitForFunction((wanted) => document.querySelector("#cloud").textContent.startsWith(wanted), name);
+  await page.waitForFunction((wanted) => document.querySelector("#cloud")?.textContent.startsWith(wanted), name);
   await settled(page);
 }
 
@@ -95,24 +113,39 @@ test("something beautiful shows before any click", () =>
     await settled(page);
     assert.ok(await page.evaluate(() => document.createElement("canvas").getContext("webgl2") !== null));
     assert.ok((await nColours(page, "first")) > 60);
-    assert.match(await page.textContent("#summary"), /^dragon: 12,000 points; mean curvature −/);
+    assert.match(await textOf(page, "#summary"), /^dragon: 12,000 points; mean curvature −/);
     await page.screenshot({ path: `${pictures}/page.png` });
   }));
 
-for (const example of ["torus", "lattice", "sphere", "ball", "curve", "part", "triangle", "half", "fineHalf", "square", "corner", "ellipse", "noisy", "noisier"]) {
+for (const example of [
+  "torus",
+  "lattice",
+  "sphere",
+  "ball",
+  "curve",
+  "part",
+  "triangle",
+  "half",
+  "fineHalf",
+  "square",
+  "corner",
+  "ellipse",
+  "noisy",
+  "noisier",
+]) {
   test(`the example ${example} renders`, () =>
     opened(`#example=${example}&section=2`, async (page) => {
       await settled(page);
       assert.ok((await nColours(page, example)) > 8);
-      assert.ok(!(await page.isVisible("#refusal")), await page.textContent("#refusal"));
+      assert.ok(!(await page.isVisible("#refusal")), await textOf(page, "#refusal"));
     }));
 }
 
 test("a mesh shows with what its vertices rest on", () =>
   opened("#example=torus&operation=mesh&colour=support", async (page) => {
     await settled(page);
-    assert.match(await page.textContent("#summary"), /Euler characteristic 0 and 0 open edges/);
-    assert.match(await page.textContent("#support"), /observed/);
+    assert.match(await textOf(page, "#summary"), /Euler characteristic 0 and 0 open edges/);
+    assert.match(await textOf(page, "#support"), /observed/);
     assert.ok((await nColours(page, "mesh")) > 4);
   }));
 
@@ -125,49 +158,58 @@ test("a dropped file is read, and a parameter changes the answer", () =>
       return made;
     }, sphere(300));
     await page.dispatchEvent("body", "drop", { dataTransfer: transfer });
-    await page.waitForFunction(() => document.querySelector("#cloud").textContent.startsWith("ball.xyz: 300 points"));
+    await page.waitForFunction(() => document.querySelector("#cloud")?.textContent.startsWith("ball.xyz: 300 points"));
     await settled(page);
-    const first = await page.textContent("#diagnostics");
+    const first = await textOf(page, "#diagnostics");
     await page.click("text=Kernel and solver");
     await page.selectOption("[name=family]", "gauss");
     await page.fill("[name=lengthScale]", "0.7");
     await settled(page);
-    await page.waitForFunction((before) => document.querySelector("#diagnostics").textContent !== before, first);
+    await page.waitForFunction((before) => document.querySelector("#diagnostics")?.textContent !== before, first);
     // The link is written once the last change is a moment old.
-    await page.waitForFunction(() => document.querySelector("#code").textContent.includes('"length_scale":0.7'));
+    await page.waitForFunction(() => document.querySelector("#code")?.textContent.includes('"length_scale":0.7'));
     await page.waitForFunction(() => location.hash.includes("lengthScale=0.7"));
   }));
 
 test("a refusal has a remedy, and a button that applies it", () =>
-  opened("#example=ellipse&family=laplace&surface=signature", async (page) => {
-    await page.click("text=Choose the kernel automatically");
-    await settled(page);
-    await page.waitForFunction(() => document.querySelector("#summary").textContent.includes("mean curvature"));
-    assert.ok(await page.isHidden("#refusal"));
-    assert.equal(await page.inputValue("[name=family]"), "auto");
-  }, { expected: ["422"] }));
+  opened(
+    "#example=ellipse&family=laplace&surface=signature",
+    async (page) => {
+      await page.click("text=Choose the kernel automatically");
+      await settled(page);
+      await page.waitForFunction(() => document.querySelector("#summary")?.textContent.includes("mean curvature"));
+      assert.ok(await page.isHidden("#refusal"));
+      assert.equal(await page.inputValue("[name=family]"), "auto");
+    },
+    { expected: ["422"] },
+  ));
 
 test("a point tells its value and deviation, and its neighbours are reached by keys", () =>
   opened("#example=sphere", async (page) => {
     await settled(page);
     const box = await page.locator("#scene").boundingBox();
+    assert.ok(box);
     await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
     await page.waitForSelector("#pinned:visible");
-    const first = await page.textContent("#pinned strong");
-    assert.match(await page.textContent("#pinned"), /mean curvature.*±.*1\/L/);
+    const first = await textOf(page, "#pinned strong");
+    assert.match(await textOf(page, "#pinned"), /mean curvature.*±.*1\/L/);
     await page.keyboard.press("ArrowRight");
-    assert.notEqual(await page.textContent("#pinned strong"), first);
+    assert.notEqual(await textOf(page, "#pinned strong"), first);
   }));
 
 test("a computation is cancelled", () =>
-  opened("#example=million", async (page) => {
-    await page.waitForRequest((request) => request.url().endsWith("/events"), { timeout: 120_000 });
-    assert.ok((await nColours(page, "million")) > 8, "a million points are drawn while they are asked about");
-    const ended = page.waitForRequest((request) => request.method() === "DELETE", { timeout: 60_000 });
-    await page.click("#cancel");
-    await ended;
-    assert.ok(await page.isHidden("#progress"));
-  }, { expected: ["404", "409"] }));
+  opened(
+    "#example=million",
+    async (page) => {
+      await page.waitForRequest((request) => request.url().endsWith("/events"), { timeout: 120_000 });
+      assert.ok((await nColours(page, "million")) > 8, "a million points are drawn while they are asked about");
+      const ended = page.waitForRequest((request) => request.method() === "DELETE", { timeout: 60_000 });
+      await page.click("#cancel");
+      await ended;
+      assert.ok(await page.isHidden("#progress"));
+    },
+    { expected: ["404", "409"] },
+  ));
 
 test("a link brings back what it was copied from", () =>
   opened("#example=ellipse&operation=normals&arrows=true&range=full", async (page) => {
@@ -184,7 +226,11 @@ test("a link brings back what it was copied from", () =>
 test("a mesh and a picture are saved", () =>
   opened("#example=sphere&operation=mesh", async (page) => {
     await settled(page);
-    for (const [kind, start] of [["png", "\x89PNG"], ["ply", "ply"], ["glb", "glTF"]]) {
+    for (const [kind, start] of [
+      ["png", "\x89PNG"],
+      ["ply", "ply"],
+      ["glb", "glTF"],
+    ]) {
       const [saved] = await Promise.all([page.waitForEvent("download"), page.click(`[data-save=${kind}]`)]);
       const bytes = readFileSync(await saved.path());
       assert.equal(bytes.subarray(0, start.length).toString("latin1"), start);
@@ -193,14 +239,29 @@ test("a mesh and a picture are saved", () =>
 
 test("a hostile link and a hostile file put nothing into the snippets", () => {
   const [text] = HOSTILE;
-  const link = new URLSearchParams({ example: "ball", solver: text, surface: text, family: text, operation: text, duplicates: text });
+  const link = new URLSearchParams({
+    example: "ball",
+    solver: text,
+    surface: text,
+    family: text,
+    operation: text,
+    duplicates: text,
+  });
   return opened(`#${link}`, async (page) => {
     await settled(page);
     for (const name of ["solver", "surface", "family"]) assert.equal(await page.inputValue(`[name=${name}]`), "auto");
-    await open(page, `${text}.ply`, `ply\nformat ascii 1.0\nelement vertex 300\n${["x", "y", "z"].map((axis) => `property float ${axis}\n`).join("")}end_header\n${sphere(300)}\n`);
-    for (const [title, language] of [["curl", "curl"], ["Python", "python"], ["TypeScript", "typescript"]]) {
+    await open(
+      page,
+      `${text}.ply`,
+      `ply\nformat ascii 1.0\nelement vertex 300\n${["x", "y", "z"].map((axis) => `property float ${axis}\n`).join("")}end_header\n${sphere(300)}\n`,
+    );
+    for (const [title, language] of [
+      ["curl", "curl"],
+      ["Python", "python"],
+      ["TypeScript", "typescript"],
+    ]) {
       await page.click(`#languages button:text-is("${title}")`);
-      const found = asked(language, await page.textContent("#code"));
+      const found = asked(language, await textOf(page, "#code"));
       if (language === "python") assert.deepEqual(found[1], ["cloud", `${text}.ply`]);
       else assert.equal(found[0][0], `${base}v1/curvatures`);
     }
@@ -213,19 +274,33 @@ test("a table that can be read in two ways is refused with its line", () =>
     const rows = "7,85081,-8,24886,39,98910\n8,1,2,3,4,5\n";
     await page.setInputFiles("#file", { name: "torn.csv", mimeType: "text/plain", buffer: Buffer.from(rows) });
     await page.waitForSelector("#refusal:visible");
-    assert.match(await page.textContent("#refusal"), /line 1: commas may be decimal marks here/);
+    assert.match(await textOf(page, "#refusal"), /line 1: commas may be decimal marks here/);
   }));
 
-for (const [name, viewport, colorScheme] of [["desk", DESK, "light"], ["phone", PHONE, "light"], ["dark", DESK, "dark"]]) {
+/** @type {[string, { width: number, height: number }, "light" | "dark"][]} */
+const VIEWS = [
+  ["desk", DESK, "light"],
+  ["phone", PHONE, "light"],
+  ["dark", DESK, "dark"],
+];
+
+for (const [name, viewport, colorScheme] of VIEWS) {
   test(`axe finds nothing serious: ${name}`, () =>
-    opened("#example=sphere", async (page) => {
-      await settled(page);
-      // The policy forbids scripts of elsewhere; the debugger's are not in the page.
-      const found = await page.evaluate(`${axe}; axe.run()`);
-      const serious = found.violations.filter(({ impact }) => ["serious", "critical"].includes(impact));
-      assert.deepEqual(serious.map(({ id, nodes }) => [id, nodes[0].html]), []);
-      await page.screenshot({ path: `${pictures}/${name}.png`, fullPage: true });
-      const isWide = await page.evaluate(() => document.documentElement.scrollWidth > window.innerWidth);
-      assert.ok(!isWide, "the page is wider than the window");
-    }, { viewport, colorScheme }));
+    opened(
+      "#example=sphere",
+      async (page) => {
+        await settled(page);
+        // The policy forbids scripts of elsewhere; the debugger's are not in the page.
+        const found = await page.evaluate(`${axe}; axe.run()`);
+        const serious = found.violations.filter(({ impact }) => ["serious", "critical"].includes(impact));
+        assert.deepEqual(
+          serious.map(({ id, nodes }) => [id, nodes[0].html]),
+          [],
+        );
+        await page.screenshot({ path: `${pictures}/${name}.png`, fullPage: true });
+        const isWide = await page.evaluate(() => document.documentElement.scrollWidth > window.innerWidth);
+        assert.ok(!isWide, "the page is wider than the window");
+      },
+      { viewport, colorScheme },
+    ));
 }

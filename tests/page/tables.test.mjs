@@ -1,4 +1,6 @@
-// Tables as the page reads them, held to the files and outcomes of tests/tables, as the reader of the subcommands is.
+// @ts-check
+// Tables as the page reads them, held to the files and outcomes of tests/tables, as the reader of the
+// subcommands is.
 
 import assert from "node:assert/strict";
 import { readdirSync, readFileSync } from "node:fs";
@@ -7,13 +9,19 @@ import { test } from "node:test";
 import { read } from "../../page/model/files.js";
 
 const folder = new URL("../tables/", import.meta.url);
-const outcomes = JSON.parse(readFileSync(new URL("expected.json", folder)));
+const outcomes = JSON.parse(readFileSync(new URL("expected.json", folder), "utf8"));
 
-const rowsOf = (tensor) => tensor && Array.from({ length: tensor.rows }, (_, row) => {
-  return [...tensor.data.subarray(row * tensor.width, (row + 1) * tensor.width)];
-});
+const rowsOf = (tensor) =>
+  tensor &&
+  Array.from({ length: tensor.rows }, (_, row) => {
+    return [...tensor.data.subarray(row * tensor.width, (row + 1) * tensor.width)];
+  });
 
-/** A cloud in the form of expected.json, where null is a value that is missing. */
+/**
+ * A cloud in the form of expected.json, where null is a value that is missing.
+ *
+ * @param {import("../../page/types.d.ts").Cloud} cloud
+ */
 function outcomeOf({ points, normals, values }) {
   const known = [...values].map(([name, numbers]) => [name, Array.from(numbers, (x) => (Number.isNaN(x) ? null : x))]);
   return {
@@ -34,7 +42,7 @@ for (const [name, expected] of Object.entries(outcomes)) {
     try {
       found = outcomeOf(read(new Uint8Array(readFileSync(new URL(name, folder))), name));
     } catch (error) {
-      found = { refused: error.message };
+      found = { refused: error instanceof Error ? error.message : error };
     }
     assert.deepEqual(found, expected);
   });

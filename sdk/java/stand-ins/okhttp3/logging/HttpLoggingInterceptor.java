@@ -4,7 +4,8 @@ import java.io.IOException;
 import okhttp3.Interceptor;
 import okhttp3.Response;
 
-/** Stands in for the logging interceptor of OkHttp, which the client adds when debugging is switched on. Logs nothing. */
+/** Stands in for the logging interceptor of OkHttp, which the client adds when debugging is switched on. Logs
+ * nothing. */
 public class HttpLoggingInterceptor implements Interceptor {
     public enum Level { BODY }
 

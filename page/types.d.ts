@@ -1,0 +1,154 @@
+// Types of what the modules of the page hand one another. `tests/scripts` checks them; they are never served.
+
+import type { Tensor } from "./model/tensors.js";
+
+export type Settings = typeof import("./model/state.js").DEFAULTS;
+
+/** Points with what is known at them. */
+export interface Cloud {
+  name: string;
+  points: Tensor;
+  normals?: Tensor;
+  /** Values of the points by the names of their columns. */
+  values: Map<string, Float64Array>;
+  /** Rows of the file that have no position. */
+  nLeftOut?: number;
+  /** The curve that the points were taken from. */
+  exact?: number[][];
+  /** The answer to the first question, which comes with the cloud. */
+  known?: Answer;
+}
+
+export interface Answer {
+  tensors: Record<string, Tensor>;
+  fields: Fields;
+  seconds?: number;
+  /** Milliseconds by stage. */
+  timing?: Record<string, number>;
+}
+
+/** Members of an answer that are no tensors. */
+export interface Fields {
+  degenerate?: { query: number; reason: string }[];
+  parts?: { euler_characteristic: number; n_boundary_edges: number }[];
+  /** What each vertex of a mesh rests on. */
+  support?: string[];
+  closedness?: number;
+  diagnostics?: Diagnostics;
+}
+
+/** How an answer was computed. */
+export interface Diagnostics {
+  solver?: string;
+  kernel?: Record<string, string | number>;
+  alpha?: number;
+  reciprocal_condition?: number;
+  warnings?: { detail: string }[];
+}
+
+/** Numbers that points can be coloured by. */
+export interface Quantity {
+  id: string;
+  title: string;
+  unit: string;
+  /** Whether 0 is in the middle of the colours. */
+  isSigned: boolean;
+  values: ArrayLike<number>;
+  deviations?: ArrayLike<number>;
+}
+
+/** How numbers become colours. */
+export interface ColourRange {
+  low: number;
+  high: number;
+  /** The deviation at which a colour is grey. 0: no colour is. */
+  full: number;
+  /** The deviation beyond which a point is hidden. */
+  hide: number;
+  isSigned: boolean;
+  hasLines?: boolean;
+}
+
+/** Queries that are marked for one reason, and the colour of the marks. */
+export interface Marks {
+  points: number[];
+  colour: number[];
+}
+
+/** How far a job is. */
+export interface Progress {
+  stage?: string;
+  fraction?: number;
+  seconds_left?: number;
+}
+
+/** A problem document. */
+export interface Problem {
+  type?: string;
+  title: string;
+  detail: string;
+  status?: number;
+  minimum_alpha?: number;
+  errors?: { pointer: string }[];
+}
+
+/** What can be done about a refusal: a label, and the settings that it sets. */
+export interface Remedy {
+  label: string;
+  set: Partial<Settings>;
+}
+
+/** Everything that the page remembers. */
+export interface PageState {
+  settings: Settings;
+  cloud?: Cloud;
+  /** The id of the cloud, once it is registered. */
+  cloudId?: string;
+  answer?: Answer;
+  quantities: Quantity[];
+  /** Marks of the answer by reason, and the reason of each marked point. */
+  reasons: Map<string, Marks>;
+  reasonOf: Map<number, string>;
+  /** Reasons whose marks are hidden. */
+  hidden: Set<string>;
+  /** The pinned point. */
+  point?: number;
+  /** The operation of the answer on screen. */
+  shown?: string;
+  language: string;
+  /** What is under way: a cloud that is loaded, a question, a section, a change of the link. */
+  loading?: object;
+  asking?: AbortController;
+  cutting?: AbortController;
+  keeping?: number;
+}
+
+/** The elements of index.html by their ids. */
+export interface Elements {
+  settings: HTMLFormElement;
+  cloud: HTMLElement;
+  file: HTMLInputElement;
+  bySupport: HTMLInputElement;
+  scaleSlider: HTMLInputElement;
+  alphaSlider: HTMLInputElement;
+  hideText: HTMLElement;
+  key: HTMLInputElement;
+  scene: HTMLCanvasElement;
+  scale: HTMLElement;
+  tip: HTMLElement;
+  progress: HTMLElement;
+  cancel: HTMLButtonElement;
+  refusal: HTMLElement;
+  summary: HTMLElement;
+  title: HTMLElement;
+  histogram: HTMLCanvasElement;
+  marks: HTMLElement;
+  support: HTMLElement;
+  pinned: HTMLElement;
+  link: HTMLButtonElement;
+  languages: HTMLElement;
+  code: HTMLElement;
+  copy: HTMLButtonElement;
+  diagnostics: HTMLElement;
+  drop: HTMLElement;
+}

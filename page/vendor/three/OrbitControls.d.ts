@@ -1,0 +1,2 @@
+// Types of the vendored build.
+export * from "three/examples/jsm/controls/OrbitControls.js";
