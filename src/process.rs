@@ -30,7 +30,7 @@ impl Usage {
         Self::parse(&stat, boot.trim().parse().ok()?, n_open_files)
     }
 
-    /// Parses the line of `/proc/self/stat`. The second field is the name of the program in parentheses, which
+    /// Parses the line of `/proc/self/stat`. The second field is the name of the program in parentheses, and
     /// may contain spaces and parentheses.
     fn parse(stat: &str, boot: u64, n_open_files: usize) -> Option<Self> {
         let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();

@@ -38,7 +38,7 @@ impl PlannedFits {
         merged.map(|on| merging_flops(on.n_points())).sum()
     }
 
-    /// Bytes that the request holds until it is answered: values, queries, and clouds that the cache may drop.
+    /// Bytes that the request holds until it is answered: values, queries, clouds that the cache may drop.
     pub fn n_bytes_held(&self) -> usize {
         let n_bytes = self.each().map(|fit| {
             let on = fit.on();
