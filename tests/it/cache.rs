@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 
-use crate::support::{Server, fibonacci_sphere, receive};
+use crate::support::{Server, fibonacci_sphere, pause, receive};
 
 fn interpolation(n: usize, queries: &[[f64; 3]]) -> Value {
     let points = fibonacci_sphere(n);
@@ -116,7 +116,9 @@ async fn they_cost_one_factorization_also_when_the_first_client_disconnects() {
     // The first request is under way once its cloud is registered.
     let is_registered =
         async || server.get("/v1/clouds").await.json()["clouds"].as_array().unwrap().len() == 1;
-    while !is_registered().await {}
+    while !is_registered().await {
+        pause().await;
+    }
     let others: Vec<_> = (0..31).map(|_| spawn_request(&server, &body)).collect();
     first.abort();
     let (stored, collapsed, hit) = count_outcomes(others).await;

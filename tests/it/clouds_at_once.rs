@@ -11,7 +11,7 @@ use crate::common::random::Random;
 use crate::contract::Received;
 use crate::durable::Folder;
 use crate::process::Process;
-use crate::support::{Server, http_client, receive};
+use crate::support::{Server, pause, receive, unpooled};
 
 const N_CLIENTS: usize = 8;
 
@@ -30,7 +30,7 @@ fn points(cloud: usize) -> Value {
 }
 
 async fn ask(url: String, method: Method, body: Option<&Value>) -> Received {
-    let request = http_client().request(method, url);
+    let request = unpooled().request(method, url);
     receive(match body {
         Some(body) => request.json(body),
         None => request,
@@ -110,6 +110,7 @@ async fn rounds(processes: &[Process], folder: &Folder) {
             while let Err(said) = agrees(process, id, folder, always).await {
                 let may_not_know_yet = processes.len() > 1 && began.elapsed() < KNOWN_TO_ALL;
                 assert!(may_not_know_yet, "round {round}: {said}");
+                pause().await;
             }
         }
     }

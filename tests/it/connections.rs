@@ -9,7 +9,7 @@ use tokio::net::TcpStream;
 
 use crate::contract::{self, Received};
 use crate::routes::route_of;
-use crate::support::{Server, fibonacci_sphere};
+use crate::support::{Server, fibonacci_sphere, pause};
 
 /// Timeout of a wait. Longer than anything here should take, even on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -501,7 +501,7 @@ async fn long_work_ends_with_a_client_that_may_have_left() {
     assert!(text.is_empty(), "{text}");
     while is_busy().await {
         assert!(began.elapsed() < PATIENCE, "the work goes on");
-        tokio::task::yield_now().await;
+        pause().await;
     }
 }
 

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::common::random::Random;
 use crate::process::Process;
-use crate::support::{fibonacci_sphere, http_client, receive};
+use crate::support::{fibonacci_sphere, http_client, pause, receive, unpooled};
 
 /// A temporary folder, removed at the end of the test.
 pub struct Folder(PathBuf);
@@ -59,13 +59,13 @@ fn points(shift: f64, n: usize) -> Value {
 }
 
 async fn post(process: &Process, path: &str, body: &Value) -> (u16, Value) {
-    let client = http_client();
+    let client = http_client().build().unwrap();
     let answer = receive(client.post(process.url(path)).json(body)).await;
     (answer.status, serde_json::from_slice(&answer.bytes).unwrap())
 }
 
 async fn get(process: &Process, path: &str) -> (u16, Value) {
-    let answer = receive(http_client().get(process.url(path))).await;
+    let answer = receive(unpooled().get(process.url(path))).await;
     (answer.status, serde_json::from_slice(&answer.bytes).unwrap())
 }
 
@@ -104,7 +104,7 @@ async fn clouds_are_there_after_the_process_was_killed() {
     // Points that are already stored are recognised.
     let (status, known) = post(&process, "/v1/clouds", &json!({"points": points(1.0, 40)})).await;
     assert_eq!((status, &known["cloud_id"]), (200, &json!(inline)));
-    let deleted = receive(http_client().delete(process.url(&format!("/v1/clouds/{id}")))).await;
+    let deleted = receive(unpooled().delete(process.url(&format!("/v1/clouds/{id}")))).await;
     assert_eq!(deleted.status, 204);
     kill(process);
 
@@ -134,7 +134,7 @@ async fn no_moment_to_be_killed_at_loses_what_was_acknowledged() {
             let mut done = Vec::new();
             for k in 0..40 {
                 let points = points(f64::from(100 * moment + k), 60);
-                let request = http_client().post(&url).json(&json!({"points": points}));
+                let request = unpooled().post(&url).json(&json!({"points": points}));
                 let Ok(answer) = request.send().await else { break };
                 let Ok(text) = answer.text().await else { break };
                 let Ok(cloud) = serde_json::from_str::<Value>(&text) else { break };
@@ -177,7 +177,7 @@ fn large_fit() -> Value {
 
 /// Returns how many solvers of a kind a process has prepared, and how many damaged objects it found.
 async fn counts(process: &Process, kind: &str) -> (String, String) {
-    let metrics = receive(http_client().get(process.url("/metrics"))).await;
+    let metrics = receive(unpooled().get(process.url("/metrics"))).await;
     let text = String::from_utf8(metrics.bytes).unwrap();
     let value = |name: &str| {
         let line = text.lines().find(|line| line.starts_with(name)).unwrap();
@@ -198,7 +198,7 @@ async fn a_factor_is_read_instead_of_made_again() {
     };
     let wait_for_factor = async || {
         while factors().is_empty() {
-            tokio::task::yield_now().await;
+            pause().await;
         }
     };
     let process = Process::start(&folder.flags());
@@ -228,7 +228,7 @@ async fn a_factor_is_read_instead_of_made_again() {
     wait_for_factor().await;
 
     let id = first["diagnostics"]["cloud_id"].as_str().unwrap();
-    let deleted = receive(http_client().delete(process.url(&format!("/v1/clouds/{id}")))).await;
+    let deleted = receive(unpooled().delete(process.url(&format!("/v1/clouds/{id}")))).await;
     assert_eq!((deleted.status, factors()), (204, vec![]));
 }
 
@@ -269,7 +269,7 @@ async fn a_store_that_takes_nothing_leaves_memory_and_catches_up() {
     assert_eq!(get(&process, "/health/ready").await.0, 503);
     fs::remove_file(&owner).unwrap();
     while get(&process, "/health/ready").await.0 != 200 {
-        tokio::task::yield_now().await;
+        pause().await;
     }
     kill(process);
     let process = Process::start(&folder.flags());
@@ -300,7 +300,7 @@ async fn what_was_acknowledged_while_the_store_takes_nothing_makes_no_room_for_o
     assert!(acknowledged.len() >= 2 && n_refused > 10, "{} and {n_refused}", acknowledged.len());
     fs::remove_file(&owner).unwrap();
     while get(&process, "/health/ready").await.0 != 200 {
-        tokio::task::yield_now().await;
+        pause().await;
     }
     kill(process);
     let process = Process::start(&folder.flags());
@@ -316,14 +316,14 @@ async fn catching_up_brings_nothing_back_that_was_deleted() {
     let [one, two] = [Process::start(&flags), Process::start(&flags)];
     let path_of = |cloud: Value| format!("/v1/clouds/{}", cloud["cloud_id"].as_str().unwrap());
     let deleted = path_of(post(&one, "/v1/clouds", &json!({"points": points(0.0, 30)})).await.1);
-    assert_eq!(receive(http_client().delete(two.url(&deleted))).await.status, 204);
+    assert_eq!(receive(unpooled().delete(two.url(&deleted))).await.status, 204);
     // The first process has it in memory, and another cloud that the store does not take.
     fs::remove_dir_all(folder.0.join("everyone")).ok();
     fs::write(folder.0.join("everyone"), b"").unwrap();
     let late = path_of(post(&one, "/v1/clouds", &json!({"points": points(1.0, 30)})).await.1);
     fs::remove_file(folder.0.join("everyone")).unwrap();
     while get(&one, "/health/ready").await.0 != 200 {
-        tokio::task::yield_now().await;
+        pause().await;
     }
     assert_eq!((get(&two, &late).await.0, get(&two, &deleted).await.0), (200, 404));
 }
@@ -347,7 +347,7 @@ async fn a_damaged_cloud_is_whole_again_once_it_is_posted_again() {
     kill(process);
     let process = Process::start(&folder.flags());
     assert_eq!(get(&process, &format!("/v1/clouds/{id}")).await.0, 200);
-    let deleted = receive(http_client().delete(process.url(&format!("/v1/clouds/{id}")))).await;
+    let deleted = receive(unpooled().delete(process.url(&format!("/v1/clouds/{id}")))).await;
     assert_eq!(deleted.status, 204);
     let left: Vec<_> =
         folder.files().into_iter().filter(|file| file.to_string_lossy().contains(id)).collect();
@@ -362,16 +362,16 @@ async fn what_another_process_deletes_is_gone_and_can_be_posted_again() {
     let (_, cloud) = post(&one, "/v1/clouds", &body).await;
     let path = format!("/v1/clouds/{}", cloud["cloud_id"].as_str().unwrap());
     assert_eq!(get(&two, &path).await, (200, cloud));
-    let deleted = receive(http_client().delete(two.url(&path))).await;
+    let deleted = receive(unpooled().delete(two.url(&path))).await;
     assert_eq!((deleted.status, get(&two, &path).await.0), (204, 404));
     // The first process still has it in memory. But its list is the store's, and a new acknowledgement holds.
     assert_eq!(get(&one, "/v1/clouds").await.1["clouds"], json!([]));
     let (status, again) = post(&one, "/v1/clouds", &body).await;
     assert_eq!((status, get(&two, &path).await), (201, (200, again)));
-    receive(http_client().delete(two.url(&path))).await;
+    receive(unpooled().delete(two.url(&path))).await;
     // After ten seconds at most.
     while get(&one, &path).await.0 == 200 {
-        tokio::task::yield_now().await;
+        pause().await;
     }
 }
 
@@ -394,7 +394,7 @@ async fn a_store_that_is_full_lets_the_oldest_go() {
         clouds.iter().map(|cloud| cloud["cloud_id"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
     };
     while listed().await.len() > 9 {
-        tokio::task::yield_now().await;
+        pause().await;
     }
     let left = listed().await;
     assert!(left.len() >= 5 && ids.ends_with(&left), "{} are left", left.len());
@@ -433,7 +433,7 @@ async fn what_could_not_be_read_again_is_not_kept() {
     assert_eq!(get(&process, &format!("/v1/clouds/{id}")).await.0, 500);
     let request =
         json!({"cloud": {"id": id}, "kernel": {"family": "matern", "length_scale": 1.0}, "alpha": 1.0});
-    let asking = http_client().post(process.url("/v1/normals")).header("prefer", "respond-async");
+    let asking = unpooled().post(process.url("/v1/normals")).header("prefer", "respond-async");
     let accepted = asking.json(&request).send().await.unwrap();
     let path = accepted.headers()["location"].to_str().unwrap().to_owned();
     let (status, problem) = get(&process, &format!("{path}/result")).await;

@@ -8,10 +8,10 @@ use serde_json::Value;
 
 use crate::contract::{self, Received};
 use crate::process::{Process, curvatures, get, gramian, logged};
-use crate::support::{http_client, receive};
+use crate::support::{LOOK_EVERY, pause, receive, unpooled};
 
 fn spawn_post(process: &Process, path: &str, body: &Value) -> tokio::task::JoinHandle<(u16, Value)> {
-    let request = http_client().post(process.url(path)).json(body);
+    let request = unpooled().post(process.url(path)).json(body);
     tokio::spawn(async move {
         let answer = receive(request).await;
         (answer.status, answer.json().unwrap())
@@ -23,10 +23,14 @@ async fn the_probe_of_the_container_says_whether_the_server_is_ready() {
     let process = Process::start(&["--threads", "1", "--max-queue", "0"]);
     assert_eq!(process.health().code(), Some(0));
     let slow = spawn_post(&process, "/v1/curvatures", &curvatures(12_000));
-    while get(&process, "/health/ready").await.0 == 200 {}
+    while get(&process, "/health/ready").await.0 == 200 {
+        pause().await;
+    }
     assert!(!process.health().success());
     slow.abort();
-    while get(&process, "/health/ready").await.0 != 200 {}
+    while get(&process, "/health/ready").await.0 != 200 {
+        pause().await;
+    }
     assert_eq!(process.health().code(), Some(0));
     let address = process.address().to_owned();
     process.terminate();
@@ -42,7 +46,9 @@ async fn a_request_under_way_is_finished_before_the_process_ends() {
     let process = Process::start(&[]);
     let slow = spawn_post(&process, "/v1/curvatures", &curvatures(5000));
     // The request is under way once its cloud is registered.
-    while get(&process, "/v1/clouds").await.1["clouds"][0].is_null() {}
+    while get(&process, "/v1/clouds").await.1["clouds"][0].is_null() {
+        pause().await;
+    }
     process.terminate();
     let (status, answer) = slow.await.unwrap();
     assert_eq!(status, 200);
@@ -103,7 +109,7 @@ async fn a_client_that_never_finishes_its_request_does_not_hold_the_process() {
         let began = Instant::now();
         while process.child.try_wait().unwrap().is_none() {
             assert!(began.elapsed() < Duration::from_secs(10), "still running after {stalled:?}");
-            std::thread::yield_now();
+            std::thread::sleep(LOOK_EVERY);
         }
         assert_eq!(process.finish().0.code(), Some(0));
     }
@@ -184,7 +190,7 @@ async fn a_second_signal_ends_the_process_at_once() {
         process.terminate();
         let has_begun = || process.lines.lock().unwrap().iter().any(|line| line.contains("draining"));
         while !has_begun() {
-            std::thread::yield_now();
+            std::thread::sleep(LOOK_EVERY);
         }
         assert!(process.child.try_wait().unwrap().is_none());
         let pid = process.child.id().to_string();

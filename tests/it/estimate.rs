@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::common::random::Random;
 use crate::metrics::samples;
 use crate::routes::{ROUTES, route_of};
-use crate::support::{Answer, Server, document, fibonacci_sphere};
+use crate::support::{Answer, Server, document, fibonacci_sphere, pause};
 
 async fn estimate(server: &Server, operation: &str, request: &Value) -> Answer {
     let mut body = request.clone();
@@ -145,6 +145,7 @@ async fn what_takes_too_long_is_told_and_not_begun_unless_the_server_is_idle() {
     let slow = server.client.post(server.url("/v1/normals")).json(&request);
     let slow = tokio::spawn(slow.send());
     while samples(&server).await["gramian_compute_running{lane=\"exclusive\"}"] < 1.0 && !slow.is_finished() {
+        pause().await;
     }
     let refused = detail(&server.post("/v1/normals", &request).await);
     assert!(slow.is_finished() || refused.contains("nothing was computed"), "{refused}");

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use crate::limits::slow_request;
 use crate::process::gramian;
-use crate::support::fibonacci_sphere;
+use crate::support::{LOOK_EVERY, fibonacci_sphere};
 
 /// A folder that is removed with its files.
 struct Folder(PathBuf);
@@ -191,7 +191,7 @@ fn an_interrupt_leaves_an_older_file_as_it_was() {
         // The file beside the output is there before the work begins.
         while folder.names().len() < 3 {
             assert!(child.try_wait().unwrap().is_none(), "{:?}", folder.names());
-            std::thread::yield_now();
+            std::thread::sleep(LOOK_EVERY);
         }
         let pid = child.id().to_string();
         assert!(Command::new("kill").args([signal, &pid]).status().unwrap().success());

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use crate::common::hostile::HOSTILE;
 use crate::process::Process;
-use crate::support::http_client;
+use crate::support::{http_client, unpooled};
 
 /// Every route that computes, with its members besides cloud, values and kernel.
 const REQUESTS: [(&str, &str); 22] = [
@@ -118,7 +118,7 @@ async fn ask_all(
 async fn the_deadline_ends_the_work_on_every_route_whatever_the_cloud() {
     let flags = ["--deadline-seconds", "2", "--threads", "2", "--max-queue", "64"];
     let process = Process::start(&flags);
-    let client = http_client();
+    let client = http_client().build().unwrap();
     // Too large to be factorized, and well within that limit.
     let large = HOSTILE.iter().map(|hostile| (hostile, 60_000));
     let small = HOSTILE.iter().step_by(4).map(|hostile| (hostile, 4000));
@@ -148,7 +148,7 @@ async fn the_deadline_ends_the_work_on_every_route_whatever_the_cloud() {
 #[tokio::test]
 async fn two_points_are_registered_beside_four_clouds_of_few_positions() {
     let process = Process::start(&["--deadline-seconds", "2", "--threads", "2"]);
-    let client = http_client();
+    let client = http_client().build().unwrap();
     let few_positions = HOSTILE.iter().find(|hostile| hostile.name == "5 positions").unwrap();
     // At least as many clouds as threads, each of another size so that none is known.
     let hostile = [57_000, 58_000, 59_000, 60_000].map(|n_points| few_positions.cloud(n_points));
@@ -174,7 +174,7 @@ fn empty_regions(n: usize, are_linked: bool) -> Vec<u8> {
 }
 
 async fn join_regions(process: &Process, key: &str, body: Vec<u8>) -> u16 {
-    let request = http_client().post(process.url("/v1/sides")).bearer_auth(key);
+    let request = unpooled().post(process.url("/v1/sides")).bearer_auth(key);
     let request = request.header("content-type", "application/json").header("content-encoding", "zstd");
     request.body(body).send().await.unwrap().status().as_u16()
 }
@@ -209,7 +209,7 @@ async fn many_empty_regions_take_no_longer_than_their_text_and_leave_another_key
             let points: Vec<[f64; 2]> =
                 (0..20).map(|i| [0.3 * i as f64 + k as f64, (i as f64).sin()]).collect();
             let body = json!({"cloud": {"points": points}, "kernel": {"family": "gauss", "length_scale": 1}});
-            let request = http_client().post(process.url("/v1/normals")).bearer_auth("modest");
+            let request = unpooled().post(process.url("/v1/normals")).bearer_auth("modest");
             let before = cpu_seconds(&process);
             assert_eq!(request.json(&body).send().await.unwrap().status(), 200);
             seconds.push(cpu_seconds(&process) - before);

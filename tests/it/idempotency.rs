@@ -7,13 +7,13 @@ use crate::jobs::{delete, result};
 use crate::limits::slow_request;
 use crate::process::Process;
 use crate::routes::route_of;
-use crate::support::{Answer, Server, http_client};
+use crate::support::{Answer, Server, pause, unpooled};
 
 const NORMALS: &str = "/v1/normals";
 
 /// Returns a request that asks for a job, with further headers.
 fn job_request(url: String, body: &Value, headers: &[(&str, &str)]) -> reqwest::RequestBuilder {
-    let request = http_client().post(url).header("prefer", "respond-async").json(body);
+    let request = unpooled().post(url).header("prefer", "respond-async").json(body);
     headers.iter().fold(request, |request, (name, value)| request.header(*name, *value))
 }
 
@@ -67,7 +67,7 @@ async fn equal_requests_to_several_processes_are_one_job() {
         assert!(answers.iter().all(|answer| *answer == (202, path.clone())), "{answers:?}");
         // The first DELETE cancels the job, the second forgets it.
         for process in &processes {
-            let deleted = http_client().delete(process.url(&path)).send().await.unwrap();
+            let deleted = unpooled().delete(process.url(&path)).send().await.unwrap();
             assert_eq!(deleted.status(), 204);
         }
     }
@@ -145,7 +145,7 @@ async fn a_key_expires_with_its_result() {
         other["alpha"] = json!(0.25);
         let (_, first) = submit(server.url(NORMALS), &request, &headers).await;
         while server.get(&first).await.status == 200 {
-            tokio::task::yield_now().await;
+            pause().await;
         }
         let (status, second) = submit(server.url(NORMALS), &other, &headers).await;
         assert!(status == 202 && second != first, "{status}");

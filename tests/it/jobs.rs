@@ -6,12 +6,12 @@ use crate::durable::Folder;
 use crate::limits::slow_request;
 use crate::process::Process;
 use crate::routes::{ROUTES, route_of};
-use crate::support::{Answer, Server, fibonacci_sphere, http_client, receive};
+use crate::support::{Answer, Server, fibonacci_sphere, pause, receive, unpooled};
 
 /// Asks for a job and returns its path. The answer is not checked against the document, which has no 202,
 /// since that status depends on a header of the request.
 pub async fn ask(url: String, body: &Value, headers: &[(&str, &str)]) -> String {
-    let mut request = http_client().post(url).header("prefer", "wait=5, respond-async").json(body);
+    let mut request = unpooled().post(url).header("prefer", "wait=5, respond-async").json(body);
     for (name, value) in headers {
         request = request.header(*name, *value);
     }
@@ -174,7 +174,7 @@ async fn a_job_has_no_deadline_and_stops_when_it_is_deleted() {
     let path = ask(server.url("/v1/normals"), &slow_request(), &[]).await;
     let stages = |job: &Value| job["progress"]["stage"].as_str().unwrap().to_owned();
     while stages(&server.get(&path).await.expect_ok()) != "factor" {
-        tokio::task::yield_now().await;
+        pause().await;
     }
     result(&server, &path).await.expect_problem(504, "deadline-exceeded");
     assert_eq!(delete(&server, &path).await, 204);
@@ -185,7 +185,9 @@ async fn a_job_has_no_deadline_and_stops_when_it_is_deleted() {
     let kernel = json!({"family": "matern", "length_scale": 0.3});
     let request = json!({"cloud": {"points": points}, "kernel": kernel, "alpha": 1e-6});
     let next = ask(server.url("/v1/curvatures"), &request, &[]).await;
-    while result(&server, &next).await.status == 504 {}
+    while result(&server, &next).await.status == 504 {
+        pause().await;
+    }
     result(&server, &next).await.expect_ok();
     assert_eq!(delete(&server, &path).await, 204);
     server.get(&path).await.expect_problem(404, "unknown-job");
@@ -261,13 +263,13 @@ async fn results_are_forgotten_after_their_time() {
     let path = ask(server.url("/v1/normals"), &route_of("/v1/normals").request(), &[]).await;
     result(&server, &path).await.expect_ok();
     while server.get(&path).await.status == 200 {
-        tokio::task::yield_now().await;
+        pause().await;
     }
     server.get(&path).await.expect_problem(404, "unknown-job");
 }
 
 async fn get(process: &Process, path: &str) -> Value {
-    let answer = receive(http_client().get(process.url(path))).await;
+    let answer = receive(unpooled().get(process.url(path))).await;
     assert_eq!(answer.status, 200, "{}", String::from_utf8_lossy(&answer.bytes));
     serde_json::from_slice(&answer.bytes).unwrap()
 }
@@ -280,7 +282,7 @@ fn long_request() -> Value {
 
 async fn wait_for(process: &Process, path: &str, status: &str) {
     while get(process, path).await["status"] != status {
-        tokio::task::yield_now().await;
+        pause().await;
     }
 }
 
@@ -296,7 +298,7 @@ async fn a_job_survives_the_end_of_its_process() {
     // The new process cannot know yet whether the previous one is only slow.
     assert_eq!(get(&process, &path).await["status"], "running");
     let found = get(&process, &format!("{path}/result")).await;
-    let answer = receive(http_client().post(process.url("/v1/normals")).json(&long_request())).await;
+    let answer = receive(unpooled().post(process.url("/v1/normals")).json(&long_request())).await;
     let expected: Value = serde_json::from_slice(&answer.bytes).unwrap();
     assert_eq!(numbers_of(found), numbers_of(expected));
     assert_eq!(get(&process, &path).await["status"], "succeeded");
@@ -311,14 +313,14 @@ async fn a_job_goes_on_elsewhere_when_its_process_is_told_to_end() {
     // The other process sees the job as well, with its progress.
     wait_for(&two, &path, "running").await;
     // A client that waits for the result at the first process is turned away with 503.
-    let waiting = http_client().get(one.url(&format!("{path}/result"))).send();
+    let waiting = unpooled().get(one.url(&format!("{path}/result"))).send();
     let waiting = tokio::spawn(waiting);
     let is_there = async || {
-        let metrics = receive(http_client().get(one.url("/metrics"))).await;
+        let metrics = receive(unpooled().get(one.url("/metrics"))).await;
         String::from_utf8(metrics.bytes).unwrap().contains("gramian_http_requests_in_flight 2\n")
     };
     while !is_there().await {
-        tokio::task::yield_now().await;
+        pause().await;
     }
     one.terminate();
     assert!(one.finish().0.success());
@@ -333,14 +335,14 @@ async fn a_job_is_cancelled_by_another_process() {
     let [one, two] = [Process::start(&folder.flags()), Process::start(&folder.flags())];
     let path = ask(one.url("/v1/normals"), &slow_request(), &[]).await;
     wait_for(&two, &path, "running").await;
-    assert_eq!(receive(http_client().delete(two.url(&path))).await.status, 204);
+    assert_eq!(receive(unpooled().delete(two.url(&path))).await.status, 204);
     wait_for(&one, &path, "cancelled").await;
     let is_idle = async || {
-        let metrics = receive(http_client().get(one.url("/metrics"))).await;
+        let metrics = receive(unpooled().get(one.url("/metrics"))).await;
         String::from_utf8(metrics.bytes).unwrap().contains("gramian_jobs{status=\"running\"} 0\n")
     };
     while !is_idle().await {
-        tokio::task::yield_now().await;
+        pause().await;
     }
 }
 
@@ -361,14 +363,14 @@ async fn a_job_that_waits_is_begun_by_whoever_has_a_turn_and_once() {
     assert_eq!(get(&one, &path).await["status"], "succeeded");
     assert_eq!(get(&one, &slow).await["status"], "running");
     let waits_for_nothing = async || {
-        let metrics = receive(http_client().get(one.url("/metrics"))).await;
+        let metrics = receive(unpooled().get(one.url("/metrics"))).await;
         String::from_utf8(metrics.bytes).unwrap().contains("gramian_jobs{status=\"queued\"} 0\n")
     };
     while !waits_for_nothing().await {
-        tokio::task::yield_now().await;
+        pause().await;
     }
     for path in [&slow, &path] {
-        assert_eq!(receive(http_client().delete(two.url(path))).await.status, 204);
+        assert_eq!(receive(unpooled().delete(two.url(path))).await.status, 204);
     }
     let (_, log) = {
         two.terminate();
@@ -383,7 +385,7 @@ async fn a_request_does_not_wait_for_a_job() {
     let server = Server::with_flags(&["--threads", "1"]).await;
     let path = ask(server.url("/v1/normals"), &slow_request(), &[]).await;
     while server.get(&path).await.expect_ok()["progress"]["stage"] != "factor" {
-        tokio::task::yield_now().await;
+        pause().await;
     }
     // Enough work to make other requests wait for it.
     let points = fibonacci_sphere(3200);
@@ -415,7 +417,7 @@ async fn jobs_of_one_key_leave_places_to_another() {
             && metrics.contains("\ngramian_jobs{status=\"running\"} 2\n")
     };
     while !is_so(&server.get("/metrics").await.text) {
-        tokio::task::yield_now().await;
+        pause().await;
     }
 }
 
@@ -423,7 +425,7 @@ async fn jobs_of_one_key_leave_places_to_another() {
 async fn as_many_may_follow_jobs_as_half_of_the_connections() {
     let server = Server::with_flags(&["--threads", "1", "--max-connections", "8"]).await;
     let path = ask(server.url("/v1/normals"), &slow_request(), &[]).await;
-    let follow = || http_client().get(server.url(&format!("{path}/events"))).send();
+    let follow = || unpooled().get(server.url(&format!("{path}/events"))).send();
     let mut following = Vec::new();
     for _ in 0..4 {
         let events = follow().await.unwrap();
@@ -434,6 +436,8 @@ async fn as_many_may_follow_jobs_as_half_of_the_connections() {
     // A client that waits for a result occupies a connection as well.
     result(&server, &path).await.expect_problem(503, "overloaded");
     drop(following);
-    while follow().await.unwrap().status() == 503 {}
+    while follow().await.unwrap().status() == 503 {
+        pause().await;
+    }
     assert_eq!(delete(&server, &path).await, 204);
 }

@@ -11,7 +11,7 @@ use crate::jobs::{ask, delete, result};
 use crate::limits::slow_request;
 use crate::process::Process;
 use crate::routes::route_of;
-use crate::support::{Server, fibonacci_sphere, http_client, receive};
+use crate::support::{Server, fibonacci_sphere, pause, receive, unpooled};
 
 /// Returns a request for a matrix of n² numbers.
 fn matrix(n: usize) -> Value {
@@ -48,7 +48,7 @@ async fn results_that_nobody_reads_are_within_the_budget() {
     let process = Process::start(&["--threads", "2", "--memory-bytes", "402653184"]);
     let path = ask(process.url(MATRIX), &matrix(560), &[SAFETENSORS]).await;
     let path = format!("{path}/result");
-    let answer = receive(http_client().get(process.url(&path))).await;
+    let answer = receive(unpooled().get(process.url(&path))).await;
     assert!(answer.status == 200 && answer.bytes.len() > 2_500_000, "{}", answer.bytes.len());
     let mut streams: Vec<_> = (0..250).map(|_| get_unread(&process, &path)).collect();
     for stream in &mut streams {
@@ -64,7 +64,7 @@ async fn results_that_nobody_reads_are_within_the_budget() {
     assert!(peak <= BUDGET, "{peak} bytes at the peak, {BUDGET} allowed");
     // Unread results are not lost: a client that reads receives the whole result, even after the job was
     // deleted.
-    assert_eq!(receive(http_client().delete(process.url(&path[..path.len() - 7]))).await.status, 204);
+    assert_eq!(receive(unpooled().delete(process.url(&path[..path.len() - 7]))).await.status, 204);
     let mut text = Vec::new();
     let mut first = streams.swap_remove(0);
     first.set_read_timeout(Some(std::time::Duration::from_secs(2))).unwrap();
@@ -75,7 +75,7 @@ async fn results_that_nobody_reads_are_within_the_budget() {
 
 /// Returns the bytes of a part of the memory that a process has reserved.
 async fn reserved(process: &Process, part: &str) -> u64 {
-    let metrics = receive(http_client().get(process.url("/metrics"))).await.text().to_owned();
+    let metrics = receive(unpooled().get(process.url("/metrics"))).await.text().to_owned();
     let name = format!("gramian_memory_used_bytes{{part=\"{part}\"}} ");
     let line = metrics.lines().find(|line| line.starts_with(&name)).unwrap();
     line[name.len()..].parse::<f64>().unwrap() as u64
@@ -87,7 +87,7 @@ async fn unread_results_of_a_directory_take_no_more_than_they_reserve() {
     let flags = [&folder.flags()[..], &["--threads", "2", "--memory-bytes", "402653184"]].concat();
     let process = Process::start(&flags);
     let path = format!("{}/result", ask(process.url(MATRIX), &matrix(560), &[]).await);
-    let answer = receive(http_client().get(process.url(&path))).await;
+    let answer = receive(unpooled().get(process.url(&path))).await;
     assert!(answer.status == 200 && answer.bytes.len() > 6_000_000, "{}", answer.bytes.len());
     let (resident, work) = (process.peak_resident_bytes(), reserved(&process, "work").await);
     // All are read from the directory at once.
@@ -158,7 +158,7 @@ async fn a_result_that_is_waited_for_is_unknown_once_its_job_is_deleted() {
         let waiting = result(&server, &path);
         let deleting = async {
             while metric(&server, "gramian_http_requests_in_flight").await < 2.0 {
-                tokio::task::yield_now().await;
+                pause().await;
             }
             (delete(&server, &path).await, delete(&server, &path).await)
         };
@@ -228,7 +228,7 @@ async fn bytes_of_results_in_the_store_are_bounded_and_one_key_has_half() {
     drop(server);
     let server = Server::with_flags(&flags.concat()).await;
     while metric(&server, "gramian_store_job_bytes").await < 9e6 {
-        tokio::task::yield_now().await;
+        pause().await;
     }
     let path = location(&ask_with_key(&server, "greedy", MATRIX, &request).await);
     assert_eq!(result_with_key(&server, "greedy", &path).await, 413);
@@ -275,6 +275,6 @@ async fn jobs_that_another_process_deleted_make_room_here() {
     assert_eq!(delete(&two, &path).await, 204);
     let asking = || one.client.post(one.url("/v1/normals")).header("prefer", "respond-async").json(&request);
     while asking().send().await.unwrap().status() == 503 {
-        tokio::task::yield_now().await;
+        pause().await;
     }
 }

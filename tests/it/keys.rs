@@ -10,7 +10,7 @@ use serde_json::json;
 use crate::contract::Received;
 use crate::limits::slow_request;
 use crate::process::{Process, gramian, logged};
-use crate::support::{http_client, receive};
+use crate::support::{http_client, pause, receive, unpooled};
 
 /// A temporary file of keys, removed when dropped.
 struct KeysFile(PathBuf);
@@ -52,7 +52,7 @@ fn key(name: &str, more: &str) -> (String, String) {
 }
 
 async fn list(process: &Process, key: &str) -> Received {
-    receive(http_client().get(process.url("/v1/clouds")).bearer_auth(key)).await
+    receive(unpooled().get(process.url("/v1/clouds")).bearer_auth(key)).await
 }
 
 #[tokio::test]
@@ -62,12 +62,12 @@ async fn keys_of_a_file_are_replaced_without_a_restart() {
     let (new, lines_of_new) = key("lab-next", "view = \"lab\"");
     let file = KeysFile::new("rotation", &[&lines_of_old, &lines_of_other]);
     let process = file.start();
-    let posting = http_client().post(process.url("/v1/clouds")).bearer_auth(&old);
+    let posting = unpooled().post(process.url("/v1/clouds")).bearer_auth(&old);
     assert_eq!(receive(posting.json(&json!({"points": [[0, 1], [1, 0]]}))).await.status, 201);
     assert_eq!((list(&process, &other).await.status, list(&process, &new).await.status), (200, 401));
     file.write(&[&lines_of_other, &lines_of_old, &lines_of_new]);
     while list(&process, &new).await.status == 401 {
-        tokio::task::yield_now().await;
+        pause().await;
     }
     // Holders of the old or the new key see the same clouds, and nobody else does.
     for (key, n_clouds) in [(&old, 1), (&new, 1), (&other, 0)] {
@@ -76,14 +76,14 @@ async fn keys_of_a_file_are_replaced_without_a_restart() {
     }
     file.write(&[&lines_of_new]);
     while list(&process, &old).await.status == 200 {
-        tokio::task::yield_now().await;
+        pause().await;
     }
     assert_eq!((list(&process, &other).await.status, list(&process, &new).await.status), (401, 200));
     // An invalid file changes nothing.
     file.write(&[&lines_of_old, "oops"]);
     let refused = async {
         while !process.lines.lock().unwrap().iter().any(|line| line.contains("was not reloaded")) {
-            tokio::task::yield_now().await;
+            pause().await;
         }
     };
     tokio::time::timeout(Duration::from_secs(60), refused).await.expect("the file is refused in the log");
@@ -111,7 +111,7 @@ async fn a_file_of_the_same_length_and_time_is_another_if_its_keys_are() {
     fs::File::options().append(true).open(&next).unwrap().set_modified(since).unwrap();
     fs::rename(&next, &file.0).unwrap();
     while list(&process, &new).await.status == 401 {
-        tokio::task::yield_now().await;
+        pause().await;
     }
     assert_eq!(list(&process, &old).await.status, 401);
 }
@@ -121,7 +121,7 @@ async fn events_count_among_the_requests_at_once_until_they_end() {
     let (one, lines_of_one) = key("one", "concurrent_requests = 1");
     let file = KeysFile::new("events", &[&lines_of_one]);
     let process = file.start();
-    let client = http_client();
+    let client = http_client().build().unwrap();
     let asking = client.post(process.url("/v1/normals")).bearer_auth(&one).header("prefer", "respond-async");
     let job: serde_json::Value = asking.json(&slow_request()).send().await.unwrap().json().await.unwrap();
     let path = format!("/v1/jobs/{}", job["job_id"].as_str().unwrap());
@@ -130,7 +130,7 @@ async fn events_count_among_the_requests_at_once_until_they_end() {
     assert_eq!((following.status(), list(&process, &one).await.status), (200.try_into().unwrap(), 429));
     drop(following);
     while list(&process, &one).await.status == 429 {
-        tokio::task::yield_now().await;
+        pause().await;
     }
     assert_eq!(receive(client.delete(process.url(&path)).bearer_auth(&one)).await.status, 204);
 }
@@ -152,7 +152,7 @@ async fn beyond_its_rate_a_key_is_told_when_to_come_back() {
     for _ in 0..20 {
         assert_eq!(list(&process, &fast).await.status, 200);
     }
-    let metrics = receive(http_client().get(process.url("/metrics"))).await;
+    let metrics = receive(unpooled().get(process.url("/metrics"))).await;
     assert!(String::from_utf8_lossy(&metrics.bytes).contains("\ngramian_rate_limited_total 1\n"));
 }
 

@@ -8,7 +8,7 @@ use crate::contract::{self, Received};
 use crate::durable::Folder;
 use crate::jobs::{ask, delete, result};
 use crate::routes::{ROUTES, route_of};
-use crate::support::{Server, fibonacci_sphere};
+use crate::support::{Server, fibonacci_sphere, pause};
 
 /// Returns a request that takes seconds on any machine.
 pub fn slow_request() -> Value {
@@ -231,7 +231,9 @@ async fn a_full_queue_turns_requests_away_until_there_is_room() {
             tokio::spawn(request.header("content-type", "application/json").body(body.clone()).send())
         });
         let slow: Vec<_> = slow.collect();
-        while server.get("/health/ready").await.status == 200 {}
+        while server.get("/health/ready").await.status == 200 {
+            pause().await;
+        }
         for route in &ROUTES {
             let answer = server.post(route.path, &route.request()).await;
             answer.expect_problem(503, "overloaded");
@@ -248,7 +250,9 @@ async fn a_full_queue_turns_requests_away_until_there_is_room() {
         for request in slow {
             request.abort();
         }
-        while server.get("/health/ready").await.status != 200 {}
+        while server.get("/health/ready").await.status != 200 {
+            pause().await;
+        }
         for route in &ROUTES {
             server.post(route.path, &route.request()).await.expect_ok();
         }
@@ -276,7 +280,9 @@ async fn a_full_queue_leaves_what_needs_no_computation() {
             result(&server, &job).await.expect_ok();
             let slow = server.client.post(server.url("/v1/curvatures")).json(&slow_request());
             let slow = tokio::spawn(slow.send());
-            while server.get("/health/ready").await.status == 200 {}
+            while server.get("/health/ready").await.status == 200 {
+                pause().await;
+            }
             server
                 .post("/v1/normals", &route_of("/v1/normals").request())
                 .await
@@ -303,7 +309,9 @@ async fn a_full_queue_leaves_what_needs_no_computation() {
         let server = Server::with_flags(&flags).await;
         let slow = server.client.post(server.url("/v1/curvatures")).json(&slow_request());
         let slow = tokio::spawn(slow.send());
-        while server.get("/health/ready").await.status == 200 {}
+        while server.get("/health/ready").await.status == 200 {
+            pause().await;
+        }
         let list = server.get("/v1/clouds").await.expect_ok();
         let listed: Vec<_> = list["clouds"].as_array().unwrap().iter().map(path_of).collect();
         let is_listed: Vec<_> = clouds.iter().map(|cloud| listed.contains(cloud)).collect();
@@ -311,7 +319,9 @@ async fn a_full_queue_leaves_what_needs_no_computation() {
         assert_eq!(server.client.head(server.url(&clouds[0])).send().await.unwrap().status(), 200);
         server.get(&clouds[0]).await.expect_problem(503, "overloaded");
         slow.abort();
-        while server.get("/health/ready").await.status != 200 {}
+        while server.get("/health/ready").await.status != 200 {
+            pause().await;
+        }
         assert!(server.get(&clouds[0]).await.expect_ok()["spacing"].is_object());
     }
 }

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::metrics::samples;
 use crate::routes::{lattice, route_of};
-use crate::support::{Answer, Server, fibonacci_sphere};
+use crate::support::{Answer, Server, fibonacci_sphere, pause};
 
 /// Returns a request with a cloud of `n` points, a different one for each `k`.
 fn request_of(n: usize, k: usize) -> Value {
@@ -28,7 +28,9 @@ async fn small_requests_are_answered_while_large_ones_compute_and_wait_for_memor
         })
         .collect();
     // Once their clouds are registered, the first of them computes and the others wait behind it.
-    while server.get("/v1/clouds").await.expect_ok()["clouds"].as_array().unwrap().len() < 3 {}
+    while server.get("/v1/clouds").await.expect_ok()["clouds"].as_array().unwrap().len() < 3 {
+        pause().await;
+    }
     for k in 0..20 {
         server.post("/v1/normals", &request_of(100, k)).await.expect_ok();
     }
@@ -96,7 +98,9 @@ async fn retry_after_is_when_there_is_a_place() {
         let slow = server.client.post(server.url("/v1/normals")).json(&request_of(7000, k));
         let slow = tokio::spawn(slow.send());
         // The slow request holds the only place once the server is not ready. The probe itself takes none.
-        while server.get("/health/ready").await.status == 200 && !slow.is_finished() {}
+        while server.get("/health/ready").await.status == 200 && !slow.is_finished() {
+            pause().await;
+        }
         let refused = loop {
             let answer = server.post("/v1/normals", &request_of(30, k)).await;
             // A moment later the slow request has begun, and its end can be predicted.

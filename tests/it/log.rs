@@ -7,7 +7,7 @@ use std::time::Duration;
 use serde_json::{Value, json};
 
 use crate::process::{Process, curvatures, get, gramian, logged};
-use crate::support::{http_client, receive};
+use crate::support::{http_client, receive, unpooled};
 
 #[tokio::test]
 async fn the_log_names_requests_and_never_shows_what_they_carry() {
@@ -22,7 +22,7 @@ async fn the_log_names_requests_and_never_shows_what_they_carry() {
     twins["cloud"]["points"][8] = twins["cloud"]["points"][7].clone();
     twins["alpha"] = json!(0);
     for (body, id, status) in [(body, "good-1", 200), (bad, "bad-1", 422), (twins, "twins-1", 422)] {
-        let request = http_client().post(process.url("/v1/curvatures?q=0.123456789")).json(&body);
+        let request = unpooled().post(process.url("/v1/curvatures?q=0.123456789")).json(&body);
         let request = request.header("x-request-id", id).bearer_auth("secret-key");
         assert_eq!(receive(request).await.status, status);
     }
@@ -134,9 +134,9 @@ async fn requests_do_not_wait_for_a_log_reader_that_stalls() {
     let entry: Value = serde_json::from_str(&line).unwrap();
     let url = format!("http://{}/v1/kernels", entry["fields"]["address"].as_str().unwrap());
     // More lines than the pipe (64 KiB) and the queue of the log (4,096 lines) hold, and nobody reads them.
-    let client = http_client();
+    let client = http_client().timeout(Duration::from_secs(20)).build().unwrap();
     for _ in 0..6000 {
-        assert_eq!(client.get(&url).timeout(Duration::from_secs(20)).send().await.unwrap().status(), 200);
+        assert_eq!(client.get(&url).send().await.unwrap().status(), 200);
     }
     assert!(Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap().success());
     let mut rest = String::new();

@@ -6,7 +6,7 @@ use std::net::TcpStream;
 use serde_json::{Value, json};
 
 use crate::process::Process;
-use crate::support::{fibonacci_sphere, http_client, receive};
+use crate::support::{fibonacci_sphere, receive, unpooled};
 
 /// Memory budget in bytes, half a gigabyte, and the flags that set it.
 const BUDGET: usize = 512 << 20;
@@ -26,7 +26,7 @@ fn send(process: &Process, path: &str, head: &str, body: &[u8]) -> TcpStream {
 
 async fn expect_alive(process: &Process) {
     let body = request(60);
-    let answer = receive(http_client().post(process.url("/v1/normals")).json(&body)).await;
+    let answer = receive(unpooled().post(process.url("/v1/normals")).json(&body)).await;
     assert_eq!(answer.status, 200);
 }
 
@@ -34,7 +34,7 @@ async fn expect_alive(process: &Process) {
 async fn answers_that_nobody_reads_are_within_the_budget() {
     let process = Process::start(&SMALL);
     let cloud = request(1500);
-    let registered = http_client().post(process.url("/v1/clouds")).json(&cloud["cloud"]);
+    let registered = unpooled().post(process.url("/v1/clouds")).json(&cloud["cloud"]);
     let id = receive(registered).await.json().unwrap()["cloud_id"].clone();
     let body = json!({"cloud": {"id": id}, "kernel": cloud["kernel"], "alpha": 1e-8}).to_string();
     // Each answer takes 18 or 54 MB, together more than the budget. Some requests are refused, or wait.
@@ -86,7 +86,7 @@ async fn what_takes_more_than_the_budget_is_refused_before_it_is_begun() {
     let process = Process::start(&SMALL);
     let mut body = request(12_000);
     body["queries"] = json!([[0.5, 0.5, 0.5]]);
-    let answer = receive(http_client().post(process.url("/v1/interpolation")).json(&{
+    let answer = receive(unpooled().post(process.url("/v1/interpolation")).json(&{
         body["values"] = json!(vec![1.0; 12_000]);
         body
     }))
@@ -105,8 +105,7 @@ async fn each_factor_and_the_fallback_have_their_memory() {
     // matrix fits.
     let n = 6000;
     let process = Process::start(&SMALL);
-    let post =
-        async |body: &Value| receive(http_client().post(process.url("/v1/curvatures")).json(body)).await;
+    let post = async |body: &Value| receive(unpooled().post(process.url("/v1/curvatures")).json(body)).await;
     assert_eq!(post(&request(n)).await.status, 200);
     let expect_refused = |answer: crate::contract::Received| {
         let problem = answer.json().unwrap();
@@ -118,7 +117,7 @@ async fn each_factor_and_the_fallback_have_their_memory() {
     let mut two = request(n);
     two["values"] = json!(vec![1.0; n]);
     two["geometry"] = json!({"kernel": {"family": "matern", "length_scale": 0.4}});
-    let two = receive(http_client().post(process.url("/v1/surface-gradient")).json(&two)).await;
+    let two = receive(unpooled().post(process.url("/v1/surface-gradient")).json(&two)).await;
     // The first factor is cached, so it requires nothing.
     assert!(expect_refused(two) >= 4 * (n * n) as u64);
     // Pairs of points that the kernel cannot tell apart: Cholesky fails, and the fallback is refused.
@@ -138,7 +137,7 @@ async fn each_factor_and_the_fallback_have_their_memory() {
 async fn packed_bodies_are_served_whoever_shares_a_small_budget() {
     let process = Process::start(&[&SMALL[..], &["--api-keys", "one,two"]].concat());
     let body = zstd::encode_all(request(20).to_string().as_bytes(), 3).unwrap();
-    let post = http_client().post(process.url("/v1/normals")).bearer_auth("one").body(body);
+    let post = unpooled().post(process.url("/v1/normals")).bearer_auth("one").body(body);
     let post = post.header("content-type", "application/json").header("content-encoding", "zstd");
     assert_eq!(receive(post).await.status, 200);
 }
@@ -147,7 +146,7 @@ async fn packed_bodies_are_served_whoever_shares_a_small_budget() {
 async fn equal_requests_wait_for_one_factor_and_not_for_memory_for_their_own() {
     // There is memory for one factor of 6,000 points, while another factor is cached.
     let process = Process::start(&SMALL);
-    let post = |body: &Value| http_client().post(process.url("/v1/normals")).json(body);
+    let post = |body: &Value| unpooled().post(process.url("/v1/normals")).json(body);
     assert_eq!(receive(post(&request(5900))).await.status, 200);
     let mut equal = request(6000);
     equal["queries"] = json!([[0, 0, 1]]);
@@ -179,7 +178,7 @@ async fn peak(path: &str, request: &Value) -> f64 {
     // Every thread has its own buffers.
     let server = Process::start(&["--threads", "2"]);
     let idle = server.peak_resident_bytes();
-    let answer = receive(http_client().post(server.url(path)).json(request)).await;
+    let answer = receive(unpooled().post(server.url(path)).json(request)).await;
     assert_eq!(answer.status, 200);
     (server.peak_resident_bytes() - idle) as f64
 }
@@ -222,7 +221,7 @@ async fn a_refused_body_takes_little_more_than_itself() {
     ] {
         let server = Process::start(&["--threads", "2"]);
         let idle = server.peak_resident_bytes();
-        let request = http_client().post(server.url("/v1/interpolation"));
+        let request = unpooled().post(server.url("/v1/interpolation"));
         let answer = receive(request.header("content-type", media_type).body(body)).await;
         assert_eq!(answer.status, status, "{}", answer.text());
         let peak = server.peak_resident_bytes() - idle;
@@ -237,7 +236,7 @@ async fn names_of_tensors_are_not_read_one_by_one() {
     let header = format!("{{{}}}", (0..200_000).map(tensor).collect::<Vec<_>>().join(","));
     let body = [&(header.len() as u64).to_le_bytes(), header.as_bytes()].concat();
     let server = Process::start(&["--threads", "1", "--deadline-seconds", "60"]);
-    let request = http_client().post(server.url("/v1/interpolation"));
+    let request = unpooled().post(server.url("/v1/interpolation"));
     let request =
         request.header("content-type", "application/x-safetensors").header("content-encoding", "zstd");
     let answer = receive(request.body(zstd::encode_all(&body[..], 3).unwrap())).await;

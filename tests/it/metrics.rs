@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::json;
 
 use crate::routes::route_of;
-use crate::support::Server;
+use crate::support::{Server, pause};
 
 /// Returns the samples by name and labels, as they are written.
 pub async fn samples(server: &Server) -> BTreeMap<String, f64> {
@@ -81,7 +81,7 @@ async fn who_leaves_is_counted_as_well() {
     drop(request);
     let abandoned = r#"gramian_http_requests_total{method="POST",route="/v1/interpolation",status="499"}"#;
     while samples(&server).await.get(abandoned) != Some(&1.0) {
-        tokio::task::yield_now().await;
+        pause().await;
     }
     assert_eq!(samples(&server).await[in_flight], 1.0);
 }

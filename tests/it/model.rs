@@ -10,7 +10,7 @@ use crate::common::random::Random;
 use crate::contract::Received;
 use crate::durable::Folder;
 use crate::process::Process;
-use crate::support::{fibonacci_sphere, http_client, receive};
+use crate::support::{fibonacci_sphere, http_client, receive, unpooled};
 
 const N_OPERATIONS: usize = 10_000;
 const N_CLOUDS: usize = 12;
@@ -77,7 +77,7 @@ impl World {
     }
 
     async fn ask(&self, key: usize, method: Method, path: &str, body: Option<&Value>) -> Received {
-        let request = http_client().request(method, self.process.url(path)).bearer_auth(KEYS[key]);
+        let request = unpooled().request(method, self.process.url(path)).bearer_auth(KEYS[key]);
         receive(match body {
             Some(body) => request.json(body),
             None => request,
@@ -177,7 +177,7 @@ impl World {
 
     async fn start_job(&mut self, owned: Owned, kernel: usize) {
         let request = fit(kernel, owned.1, json!({"points": points(owned.1)}));
-        let client = http_client();
+        let client = http_client().build().unwrap();
         let asked = client.post(self.process.url("/v1/interpolation")).bearer_auth(KEYS[owned.0]);
         let answer = asked.header("prefer", "respond-async").json(&request).send().await.unwrap();
         assert_eq!(answer.status(), 202);

@@ -7,7 +7,7 @@ use std::thread::JoinHandle;
 
 use serde_json::{Value, json};
 
-use crate::support::{fibonacci_sphere, http_client, receive};
+use crate::support::{fibonacci_sphere, pause, receive, unpooled};
 
 /// A running binary on a free port, killed when dropped.
 pub struct Process {
@@ -72,7 +72,7 @@ impl Process {
     /// Waits until the process has logged a line with this text.
     pub async fn has_logged(&self, text: &str) {
         while !self.lines.lock().unwrap().iter().any(|line| line.contains(text)) {
-            tokio::task::yield_now().await;
+            pause().await;
         }
     }
 
@@ -103,7 +103,7 @@ impl Drop for Process {
 }
 
 pub async fn get(process: &Process, path: &str) -> (u16, Value) {
-    let answer = receive(http_client().get(process.url(path))).await;
+    let answer = receive(unpooled().get(process.url(path))).await;
     (answer.status, answer.json().unwrap())
 }
 

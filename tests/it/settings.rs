@@ -6,7 +6,7 @@ use std::process::Stdio;
 use serde_json::json;
 
 use crate::process::{Process, curvatures, get, gramian};
-use crate::support::{http_client, receive};
+use crate::support::{receive, unpooled};
 
 #[tokio::test]
 async fn every_setting_has_a_variable_and_a_flag_which_wins() {
@@ -52,7 +52,7 @@ async fn every_setting_has_a_variable_and_a_flag_which_wins() {
         let process = Process::of(command.args(flags));
         assert_eq!(get(&process, "/version").await.1["threads"], threads);
         assert_eq!(get(&process, "/v1/kernels").await.0, 401);
-        let request = http_client().post(process.url("/v1/curvatures")).bearer_auth("two");
+        let request = unpooled().post(process.url("/v1/curvatures")).bearer_auth("two");
         let request = request.header("origin", "https://one.example").json(&curvatures(6));
         let answer = receive(request).await;
         assert_eq!(answer.header("access-control-allow-origin"), "https://one.example");

@@ -5,7 +5,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpListener;
 
 use crate::process::{Process, gramian, logged};
-use crate::support::{fibonacci_sphere, http_client};
+use crate::support::{fibonacci_sphere, http_client, unpooled};
 
 const TRACE: &str = "4bf92f3577b34da6a3ce929d0e0e4736";
 
@@ -56,7 +56,7 @@ fn trace_bytes() -> Vec<u8> {
 #[tokio::test]
 async fn requests_are_spans_in_the_traces_of_their_clients() {
     let (process, listener) = traced().await;
-    let request = http_client().get(process.url("/v1/kernels"));
+    let request = unpooled().get(process.url("/v1/kernels"));
     let request = request.header("traceparent", format!("00-{TRACE}-00f067aa0ba902b7-01"));
     assert_eq!(request.header("x-request-id", "traced-1").send().await.unwrap().status(), 200);
     // Unsent spans are sent when the process ends.
@@ -69,7 +69,7 @@ async fn requests_are_spans_in_the_traces_of_their_clients() {
 
 /// Runs a job to its end, and returns its id.
 async fn job(process: &Process, headers: &[(&str, &str)]) -> String {
-    let client = http_client();
+    let client = http_client().build().unwrap();
     let mut request = client.post(process.url("/v1/normals")).header("prefer", "respond-async");
     for (name, value) in headers {
         request = request.header(*name, *value);

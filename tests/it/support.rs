@@ -1,6 +1,7 @@
 //! A server under test, and a client for it.
 
 use std::net::SocketAddr;
+use std::time::Duration;
 
 use clap::Parser;
 use gramian::config::Config;
@@ -81,7 +82,7 @@ impl Server {
             stopped.await.ok();
         };
         tokio::spawn(serve(App::new(config).await.unwrap(), listener, stop_signal));
-        Self { address, client: http_client(), _stop: stop }
+        Self { address, client: http_client().build().unwrap(), _stop: stop }
     }
 
     pub fn url(&self, path: &str) -> String {
@@ -123,10 +124,30 @@ impl Server {
     }
 }
 
-/// Returns a client. Those of `reqwest` need a cryptographic provider where they speak TLS.
-pub fn http_client() -> reqwest::Client {
+thread_local! {
+    static CLIENT: reqwest::Client =
+        http_client().pool_max_idle_per_host(0).build().expect("a client without options");
+}
+
+/// Begins a client. One that speaks TLS needs a cryptographic provider, which is that of the process.
+pub fn http_client() -> reqwest::ClientBuilder {
     gramian::server::install_provider();
-    reqwest::Client::new()
+    reqwest::Client::builder()
+}
+
+/// Returns the client of this test, for requests that have a connection each. To make one reads the
+/// certificates of the system, which takes longer than most requests.
+pub fn unpooled() -> reqwest::Client {
+    CLIENT.with(Clone::clone)
+}
+
+/// How long a test waits before it looks again whether something has happened.
+pub const LOOK_EVERY: Duration = Duration::from_millis(5);
+
+/// Waits until it is worth looking again. A loop without a pause takes a processor from the server that it
+/// waits for.
+pub async fn pause() {
+    tokio::time::sleep(LOOK_EVERY).await;
 }
 
 /// Sends a request, reads its answer to the end, and checks it against the OpenAPI document.

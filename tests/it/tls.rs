@@ -14,6 +14,7 @@ use tokio_rustls::rustls::{ClientConfig, RootCertStore};
 
 use crate::durable::Folder;
 use crate::process::{Process, gramian};
+use crate::support::pause;
 
 /// A certificate for localhost and its key, as files.
 struct Files {
@@ -103,14 +104,14 @@ async fn a_renewed_certificate_is_taken_up_without_a_restart() {
     let mut under_way = connect(&process, &first, b"http/1.1").await.unwrap();
     let second = files.renew();
     while connect(&process, &second, b"http/1.1").await.is_err() {
-        tokio::task::yield_now().await;
+        pause().await;
     }
     assert!(connect(&process, &first, b"http/1.1").await.is_err());
     assert!(get(&mut under_way, "/health/live").await.starts_with("HTTP/1.1 200"));
     // One invalid file of the pair changes nothing.
     fs::write(files.path("key"), "no key").unwrap();
     while !process.lines.lock().unwrap().iter().any(|line| line.contains("the certificate is unchanged")) {
-        tokio::task::yield_now().await;
+        pause().await;
     }
     assert!(connect(&process, &second, b"http/1.1").await.is_ok());
 }
