@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::COLUMNS_AT_ONCE;
 use super::mean_variance::MeanVariance;
 use crate::error::{NumericsError, Result};
-use crate::kernel::{Kernel, Pairs};
+use crate::kernel::Kernel;
 use crate::machine::registers::{BLOCK, Block, Pack};
 use crate::machine::small::{Small, zeros};
 use crate::machine::vector::dot;
@@ -19,7 +19,7 @@ use crate::points::cloud::Cloud;
 use crate::solver::trend::{Basis, Trend};
 use crate::solver::{Solution, Solver};
 use crate::sums::jets::check_smooth_at;
-use crate::sums::nodes::{Nodes, PackPlace};
+use crate::sums::nodes::{BlockPairs, Nodes};
 
 /// The functional `c u + g·∇u + A : D²u` at a query.
 #[derive(Debug, Clone)]
@@ -296,75 +296,55 @@ impl WithSimd for Covariances<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let mut out = Block::ZERO;
-        let trace = if self.functional.has_hessian() { self.functional.trace() } else { 0.0 };
-        let mut differences = vec![Block::ZERO; self.x.len()];
+        let Self { nodes, kernel, x, .. } = self;
+        let inverse = 1.0 / kernel.length_scale();
+        let mut differences = vec![Block::ZERO; x.len()];
+        let mut profiles = [Block::ZERO; 3];
         for block in 0..self.column.len().div_ceil(BLOCK) {
-            let pairs = CovariancePairs {
+            nodes.squared_distances(
                 simd,
-                of: &self,
-                block,
-                trace,
-                differences: &mut differences,
-                out: &mut out,
-            };
-            self.kernel.profiles(pairs);
+                BlockPairs { kernel, x, block },
+                &mut profiles[0],
+                &mut differences,
+            );
+            kernel.profiles(simd, profiles.each_mut().map(Block::registers_mut::<S>));
+            for differences in &mut differences {
+                for at in 0..Pack::<S>::PER_BLOCK {
+                    (Pack::<S>::load(simd, differences, at) * inverse).store(differences, at);
+                }
+            }
             let start = block * BLOCK;
             let end = (start + BLOCK).min(self.column.len());
+            let out = self.of(simd, &differences, &profiles);
             self.column[start..end].copy_from_slice(&out.0[..end - start]);
         }
     }
 }
 
-/// The pairs of one block of a column.
-struct CovariancePairs<'a, 'b, S> {
-    simd: S,
-    of: &'a Covariances<'b>,
-    block: usize,
-    trace: f64,
-    differences: &'a mut [Block],
-    out: &'a mut Block,
-}
-
-impl<S: Simd> Pairs<S> for CovariancePairs<'_, '_, S> {
-    /// g·s and sᵀAs.
-    type Others = (Pack<S>, Pack<S>);
-
+impl Covariances<'_> {
+    /// Computes the covariances with the points of a block from the entries of s, `[d]`, and φ, φ′, φ″.
     #[inline(always)]
-    fn pack(&mut self, at: usize) -> (Pack<S>, Self::Others) {
-        let Covariances { nodes, kernel, functional, form: terms, x, .. } = *self.of;
-        let zero = Pack::splat(self.simd, 0.0);
-        let mut along = zero;
-        let inverse = 1.0 / kernel.length_scale();
-        let differences = &mut *self.differences;
-        let q = nodes.scaled_distances(
-            self.simd,
-            PackPlace { block: self.block, at },
-            x,
-            kernel,
-            |c, difference| {
-                let difference = difference * inverse;
-                along = difference.mul_add(Pack::splat(self.simd, functional.of_gradient[c]), along);
-                difference.store(&mut differences[c], at);
-            },
-        );
-        let mut form = zero;
-        for FormTerm { a, b, factor } in terms {
-            let other = Pack::load(self.simd, &self.differences[*b], at) * *factor;
-            form = Pack::load(self.simd, &self.differences[*a], at).mul_add(other, form);
-        }
-        (q, (along, form))
-    }
-
-    #[inline(always)]
-    fn take(&mut self, at: usize, (along, form): Self::Others, [value, slope, bend]: [Pack<S>; 3]) {
-        let Covariances { kernel, functional, .. } = *self.of;
+    fn of<S: Simd>(&self, simd: S, s: &[Block], [value, slope, bend]: &[Block; 3]) -> Block {
+        let Self { kernel, functional, form: terms, .. } = self;
+        let trace = if functional.has_hessian() { functional.trace() } else { 0.0 };
         let first = 2.0 * kernel.variance();
-        let of_slopes = first * slope * (along + self.trace);
-        let of_bends = (2.0 * first) * bend * form;
-        // At D = 0, φ″ may be as large as float64 allows.
-        let jets = of_slopes + of_bends;
-        let of_value = kernel.variance() * functional.of_value;
-        value.mul_add(Pack::splat(self.simd, of_value), jets).store(self.out, at);
+        let of_value = Pack::splat(simd, kernel.variance() * functional.of_value);
+        let mut out = Block::ZERO;
+        for at in 0..Pack::<S>::PER_BLOCK {
+            let (mut along, mut form) = (Pack::<S>::splat(simd, 0.0), Pack::<S>::splat(simd, 0.0));
+            for (s, &g) in s.iter().zip(&functional.of_gradient) {
+                along = Pack::load(simd, s, at).mul_add(Pack::splat(simd, g), along);
+            }
+            for FormTerm { a, b, factor } in *terms {
+                let other = Pack::load(simd, &s[*b], at) * *factor;
+                form = Pack::load(simd, &s[*a], at).mul_add(other, form);
+            }
+            let of_slopes = first * Pack::load(simd, slope, at) * (along + trace);
+            let of_bends = (2.0 * first) * Pack::load(simd, bend, at) * form;
+            // At D = 0, φ″ may be as large as float64 allows.
+            let jets = of_slopes + of_bends;
+            Pack::load(simd, value, at).mul_add(of_value, jets).store(&mut out, at);
+        }
+        out
     }
 }

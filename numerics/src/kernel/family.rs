@@ -1,15 +1,16 @@
 //! The families of kernels, each with its formula and facts.
 
-use pulp::Simd;
+use pulp::{Simd, WithSimd};
 
 use super::facts::Facts;
 use super::gauss::Gauss;
 use super::inverse_multiquadric::InverseMultiquadric;
 use super::laplace::Laplace;
 use super::matern::Matern;
-use super::profile::{Pairs, Profiles};
+use super::profile::{Distances, Profiles};
 use super::wendland::Wendland;
 pub use super::wendland::WendlandSmoothness;
+use crate::machine::instruction_set::outlined;
 use crate::points::sampling::Scales;
 
 /// Declares the families, one line each. The file named like the family has its formula and facts.
@@ -28,12 +29,10 @@ macro_rules! families {
                 }
             }
 
-            /// Runs a loop body over the pairs of a block, with φ, φ′ and φ″ of each. Derivatives that the
-            /// body does not use are never computed.
             #[inline(always)]
-            pub(crate) fn profiles<S: Simd>(self, pairs: impl Pairs<S>) {
+            fn evaluate<S: Simd, const N: usize>(self, distances: Distances<'_, S, N>) {
                 match self {
-                    $(Self::$name $({ $parameter })? => $name $({ $parameter })?.run(pairs),)*
+                    $(Self::$name $({ $parameter })? => $name $({ $parameter })?.evaluate(distances),)*
                 }
             }
         }
@@ -53,7 +52,28 @@ families! {
     InverseMultiquadric,
 }
 
+/// The evaluation of profiles, compiled once for each instruction set and number of derivatives.
+struct Evaluation<'a, S: Simd, const N: usize> {
+    family: Family,
+    distances: Distances<'a, S, N>,
+}
+
+impl<S: Simd, const N: usize> WithSimd for Evaluation<'_, S, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<T: Simd>(self, _simd: T) {
+        self.family.evaluate(self.distances);
+    }
+}
+
 impl Family {
+    /// Overwrites squared distances by φ, and the other lists by φ′ and φ″, as [`Distances`] describes.
+    #[inline(always)]
+    pub(crate) fn profiles<S: Simd, const N: usize>(self, distances: Distances<'_, S, N>) {
+        outlined(distances.simd, Evaluation { family: self, distances });
+    }
+
     /// Returns the name of a parameter that is out of its range, and the range in words.
     pub(super) fn refused(self) -> Option<(&'static str, &'static str)> {
         self.facts(|facts| facts.refused())

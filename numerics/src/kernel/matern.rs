@@ -10,7 +10,7 @@ use pulp::Simd;
 
 use super::facts::{Facts, SMOOTH_SPACINGS};
 use super::laplace::Laplace;
-use super::profile::{Pairs, Profile, Profiles, distance_and_inverse};
+use super::profile::{Distances, Profile, Profiles, distance_and_inverse};
 use crate::machine::registers::Pack;
 use crate::machine::registers::exp::exp_minus;
 use crate::points::sampling::Scales;
@@ -27,13 +27,13 @@ pub(super) struct Matern {
 
 impl Profiles for Matern {
     #[inline(always)]
-    fn run<S: Simd>(self, pairs: impl Pairs<S>) {
+    fn evaluate<S: Simd, const N: usize>(self, distances: Distances<'_, S, N>) {
         match self.order {
             // Here s = √q, so φ = e^{−√q} is that of Laplace with ε = 0. Sharing it saves compiling a loop.
-            0 => Laplace { epsilon: 0.0 }.run(pairs),
-            1 => OfOrder::<1>.run(pairs),
-            2 => OfOrder::<2>.run(pairs),
-            order => OfAnyOrder { order }.run(pairs),
+            0 => Laplace { epsilon: 0.0 }.evaluate(distances),
+            1 => OfOrder::<1>.evaluate(distances),
+            2 => OfOrder::<2>.evaluate(distances),
+            order => OfAnyOrder { order }.evaluate(distances),
         }
     }
 }

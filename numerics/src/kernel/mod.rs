@@ -31,7 +31,7 @@ use super::points::cloud::Cloud;
 use axes::Axes;
 pub use family::Family;
 pub use matern::MAX_MATERN_ORDER;
-pub(crate) use profile::{HUGE, Pairs, distance_and_inverse};
+pub(crate) use profile::{Distances, HUGE, distance_and_inverse};
 pub use wendland::WendlandSmoothness;
 
 /// Upper bound of `2|φ′|√q = ℓ|∇k|/variance` in any family. Wendland's of smoothness 6 reaches 2.8.
@@ -207,11 +207,10 @@ impl Kernel {
         self.family.profile_at_zero()
     }
 
-    /// Runs a loop body over the pairs of a block, with φ, φ′ and φ″ of each. Derivatives that the body does
-    /// not use are never computed.
+    /// Overwrites squared distances, the first of these lists, by φ, and the others by φ′ and φ″.
     #[inline(always)]
-    pub(crate) fn profiles<S: Simd>(&self, pairs: impl Pairs<S>) {
-        self.family.profiles(pairs);
+    pub(crate) fn profiles<S: Simd, const N: usize>(&self, simd: S, lists: [&mut [S::f64s]; N]) {
+        self.family.profiles(Distances { simd, inverse_square_length: self.inverse_square_length, lists });
     }
 }
 

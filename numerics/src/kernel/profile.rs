@@ -1,8 +1,8 @@
-//! The profile φ of a family with its derivatives, and the loops over pairs that are compiled for it.
+//! The profile φ of a family with its derivatives, and their evaluation for a list of distances.
 
 use pulp::Simd;
 
-use crate::machine::registers::Pack;
+use crate::machine::registers::{IN_FLIGHT, Pack};
 
 /// A positive number so small that no scaled distance of distinct points comes near it.
 ///
@@ -28,38 +28,31 @@ pub(super) trait Profile {
     fn at<S: Simd>(&self, q: Pack<S>) -> [Pack<S>; 3];
 }
 
-/// The loop of a family over pairs. It uses the family's formula, or the one that the parameter selects.
+/// The profiles of a family: those of its formula, or of the one that its parameter selects.
 pub(super) trait Profiles {
-    fn run<S: Simd>(self, pairs: impl Pairs<S>);
+    /// Overwrites squared distances by φ, and the other lists by φ′ and φ″, as [`Distances`] describes.
+    fn evaluate<S: Simd, const N: usize>(self, distances: Distances<'_, S, N>);
 }
 
 impl<P: Profile> Profiles for P {
     #[inline(always)]
-    fn run<S: Simd>(self, pairs: impl Pairs<S>) {
-        each(pairs, self);
+    fn evaluate<S: Simd, const N: usize>(self, distances: Distances<'_, S, N>) {
+        let Distances { simd, inverse_square_length, lists } = distances;
+        for at in 0..lists[0].len() / IN_FLIGHT {
+            let profile = self.at(Pack::read(simd, lists[0], at) * inverse_square_length);
+            for order in 0..N {
+                profile[order].write(lists[order], at);
+            }
+        }
     }
 }
 
-/// The body of a loop over the pairs of one query and a block of points.
-///
-/// It is two methods of a trait and not two closures, because only a method can be made to inline. Code that
-/// is not compiled into the function that has the instruction set falls back to one call per instruction.
-pub(crate) trait Pairs<S: Simd> {
-    /// Data about a pack of pairs that [`Pairs::take`] needs besides their profile.
-    type Others;
-
-    /// Returns q of pack `at`, and the data for [`Pairs::take`].
-    fn pack(&mut self, at: usize) -> (Pack<S>, Self::Others);
-
-    /// Takes φ, φ′, φ″ of pack `at`, and what [`Pairs::pack`] returned with its q.
-    fn take(&mut self, at: usize, others: Self::Others, profile: [Pack<S>; 3]);
-}
-
-/// Runs a loop over the packs of a block, compiled for one profile.
-#[inline(always)]
-fn each<S: Simd>(mut pairs: impl Pairs<S>, profile: impl Profile) {
-    for at in 0..Pack::<S>::PER_BLOCK {
-        let (q, others) = pairs.pack(at);
-        pairs.take(at, others, profile.at(q));
-    }
+/// Squared distances whose profiles are evaluated up to derivative `N − 1`.
+pub(crate) struct Distances<'a, S: Simd, const N: usize> {
+    pub simd: S,
+    /// 1/ℓ², unit 1/L².
+    pub inverse_square_length: f64,
+    /// Lists of equally many registers, a multiple of [`IN_FLIGHT`]. The first holds the squared distances,
+    /// unit L², and takes φ. The others take φ′ and φ″.
+    pub lists: [&'a mut [S::f64s]; N],
 }

@@ -4,10 +4,10 @@ use pulp::WithSimd;
 
 use super::*;
 use crate::machine::instruction_set::InstructionSet;
-use crate::machine::registers::{BLOCK, Block, Pack};
+use crate::machine::registers::{BLOCK, Block};
 use crate::testing::all_families;
 
-/// Computes φ, φ′, φ″ of a kernel at one q, for every point of a block, by way of the kernel loops.
+/// Computes φ, φ′, φ″ of a kernel with ℓ = 1 at one q, for every point of a block.
 struct Profiles<'a>(&'a Kernel, f64);
 
 impl WithSimd for Profiles<'_> {
@@ -15,31 +15,9 @@ impl WithSimd for Profiles<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> [Block; 3] {
-        let mut blocks = [Block([f64::NAN; BLOCK]); 3];
-        self.0.profiles(Constant { simd, q: self.1, blocks: &mut blocks });
+        let mut blocks = [Block([self.1; BLOCK]); 3];
+        self.0.profiles(simd, blocks.each_mut().map(Block::registers_mut::<S>));
         blocks
-    }
-}
-
-struct Constant<'a, S> {
-    simd: S,
-    q: f64,
-    blocks: &'a mut [Block; 3],
-}
-
-impl<S: Simd> Pairs<S> for Constant<'_, S> {
-    type Others = ();
-
-    #[inline(always)]
-    fn pack(&mut self, _at: usize) -> (Pack<S>, ()) {
-        (Pack::splat(self.simd, self.q), ())
-    }
-
-    #[inline(always)]
-    fn take(&mut self, at: usize, (): (), profile: [Pack<S>; 3]) {
-        for (block, phi) in self.blocks.iter_mut().zip(profile) {
-            phi.store(block, at);
-        }
     }
 }
 

@@ -6,7 +6,7 @@
 use pulp::Simd;
 
 use super::facts::{Facts, SMOOTH_SPACINGS};
-use super::profile::{Pairs, Profile, Profiles, distance_and_inverse};
+use super::profile::{Distances, Profile, Profiles, distance_and_inverse};
 use crate::machine::registers::Pack;
 use crate::points::sampling::Scales;
 
@@ -27,11 +27,11 @@ pub(super) struct Wendland {
 
 impl Profiles for Wendland {
     #[inline(always)]
-    fn run<S: Simd>(self, pairs: impl Pairs<S>) {
+    fn evaluate<S: Simd, const N: usize>(self, distances: Distances<'_, S, N>) {
         match self.smoothness {
-            WendlandSmoothness::C2 => C2.run(pairs),
-            WendlandSmoothness::C4 => C4.run(pairs),
-            WendlandSmoothness::C6 => C6.run(pairs),
+            WendlandSmoothness::C2 => C2.evaluate(distances),
+            WendlandSmoothness::C4 => C4.evaluate(distances),
+            WendlandSmoothness::C6 => C6.evaluate(distances),
         }
     }
 }

@@ -3,9 +3,9 @@
 use pulp::{Simd, WithSimd};
 
 use super::family::Family;
-use super::profile::Pairs;
+use super::profile::Distances;
 use crate::machine::instruction_set::Portable;
-use crate::machine::registers::{Block, Pack};
+use crate::machine::registers::Block;
 
 impl Family {
     /// Returns φ, φ′ and φ″ at 0, for families that have them there.
@@ -14,7 +14,7 @@ impl Family {
     }
 }
 
-/// Evaluates the profile of a family over one block of pairs at distance 0.
+/// Evaluates the profile of a family at a block of distances 0.
 struct AtZero(Family);
 
 impl WithSimd for AtZero {
@@ -23,28 +23,8 @@ impl WithSimd for AtZero {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let mut found = [Block::ZERO; 3];
-        self.0.profiles(Zero { simd, found: &mut found });
+        let lists = found.each_mut().map(Block::registers_mut::<S>);
+        self.0.profiles(Distances { simd, inverse_square_length: 1.0, lists });
         found.map(|block| block.0[0])
-    }
-}
-
-struct Zero<'a, S: Simd> {
-    simd: S,
-    found: &'a mut [Block; 3],
-}
-
-impl<S: Simd> Pairs<S> for Zero<'_, S> {
-    type Others = ();
-
-    #[inline(always)]
-    fn pack(&mut self, _at: usize) -> (Pack<S>, ()) {
-        (Pack::splat(self.simd, 0.0), ())
-    }
-
-    #[inline(always)]
-    fn take(&mut self, at: usize, (): (), profile: [Pack<S>; 3]) {
-        for (block, value) in self.found.iter_mut().zip(profile) {
-            value.store(block, at);
-        }
     }
 }

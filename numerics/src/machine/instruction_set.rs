@@ -67,6 +67,15 @@ impl InstructionSet {
     }
 }
 
+/// Runs a loop that is compiled once for an instruction set, not into each function that calls it.
+///
+/// A function without `#[inline(always)]` does not have the instructions of the one that calls it. Here they
+/// are enabled anew.
+#[inline(never)]
+pub(crate) fn outlined<S: Simd, Op: WithSimd>(simd: S, op: Op) -> Op::Output {
+    simd.vectorize(op)
+}
+
 struct Lanes;
 
 impl WithSimd for Lanes {

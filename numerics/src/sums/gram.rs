@@ -5,11 +5,11 @@ use std::ops::Range;
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::nodes::{Nodes, PackPlace};
+use super::nodes::{BlockPairs, Nodes};
 use super::regularization::Regularization;
 use crate::error::Result;
-use crate::kernel::{Kernel, Pairs};
-use crate::machine::registers::{BLOCK, Block, Pack};
+use crate::kernel::Kernel;
+use crate::machine::registers::{BLOCK, Block};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 
@@ -101,36 +101,16 @@ impl WithSimd for KernelColumn<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let mut values = Block::ZERO;
-        let (from, to) = (self.points.start, self.points.end);
+        let Self { kernel, x, .. } = self;
+        let (from, to, variance) = (self.points.start, self.points.end, kernel.variance());
         for block in from / BLOCK..to.div_ceil(BLOCK) {
-            self.kernel.profiles(Values { simd, column: &self, block, values: &mut values });
+            self.nodes.squared_distances(simd, BlockPairs { kernel, x, block }, &mut values, &mut []);
+            kernel.profiles(simd, [values.registers_mut::<S>()]);
             let start = block * BLOCK;
             let (first, end) = (from.max(start), to.min(start + BLOCK));
-            self.out[first - from..end - from].copy_from_slice(&values.0[first - start..end - start]);
+            let out = self.out[first - from..end - from].iter_mut();
+            out.zip(&values.0[first - start..]).for_each(|(out, phi)| *out = variance * phi);
         }
-    }
-}
-
-/// Writes the kernel's values for the pairs of x with a block.
-struct Values<'a, S> {
-    simd: S,
-    column: &'a KernelColumn<'a>,
-    block: usize,
-    values: &'a mut Block,
-}
-
-impl<S: Simd> Pairs<S> for Values<'_, S> {
-    type Others = ();
-
-    #[inline(always)]
-    fn pack(&mut self, at: usize) -> (Pack<S>, ()) {
-        let KernelColumn { nodes, kernel, x, .. } = self.column;
-        (nodes.scaled_distances(self.simd, PackPlace { block: self.block, at }, x, kernel, |_, _| ()), ())
-    }
-
-    #[inline(always)]
-    fn take(&mut self, at: usize, (): (), [phi, ..]: [Pack<S>; 3]) {
-        (phi * self.column.kernel.variance()).store(self.values, at);
     }
 }
 

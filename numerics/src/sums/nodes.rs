@@ -52,49 +52,60 @@ impl Nodes {
         self.instruction_set.dispatch(op)
     }
 
-    /// Returns `q = |u|²/ℓ²` between x and a pack of points y.
+    /// Writes `|u|²` for the pairs of a query with a block, unit L².
     ///
-    /// Here u is the difference `x − y`, stretched as the kernel stretches it. `each(c, u[c])` is called for
-    /// every coordinate c, in order.
+    /// Here u is the difference `x − y` of query and point, stretched as the kernel stretches it.
+    /// `differences` takes the entries of u, one block each, or is empty.
     #[inline(always)]
-    pub(crate) fn scaled_distances<S: Simd>(
+    pub(crate) fn squared_distances<S: Simd>(
         &self,
         simd: S,
-        place: PackPlace,
-        x: &[f64],
-        kernel: &Kernel,
-        mut each: impl FnMut(usize, Pack<S>),
-    ) -> Pack<S> {
-        let PackPlace { block, at } = place;
-        let columns = &self.coordinates[block * self.dimension..][..self.dimension];
-        let coordinates = columns.iter().zip(x).enumerate();
-        let mut sum = Pack::splat(simd, 0.0);
+        pairs: BlockPairs<'_>,
+        squares: &mut Block,
+        differences: &mut [Block],
+    ) {
+        let columns = &self.coordinates[pairs.block * self.dimension..][..self.dimension];
+        let coordinates = columns.iter().zip(pairs.x).enumerate();
         // Two loops, because a test for each coordinate would take a twentieth of their time.
-        match kernel.factors() {
+        match pairs.kernel.factors() {
             None => {
-                for (c, (column, &x)) in coordinates {
-                    let difference = x - Pack::load(simd, column, at);
-                    each(c, difference);
-                    sum = difference.mul_add(difference, sum);
+                for at in 0..Pack::<S>::PER_BLOCK {
+                    let mut sum = Pack::<S>::splat(simd, 0.0);
+                    for (c, (column, &x)) in coordinates.clone() {
+                        let difference = x - Pack::load(simd, column, at);
+                        if !differences.is_empty() {
+                            difference.store(&mut differences[c], at);
+                        }
+                        sum = difference.mul_add(difference, sum);
+                    }
+                    sum.store(squares, at);
                 }
             }
             Some(factors) => {
-                for ((c, (column, &x)), &factor) in coordinates.zip(factors) {
-                    let difference = (x - Pack::load(simd, column, at)) * factor;
-                    each(c, difference);
-                    sum = difference.mul_add(difference, sum);
+                for at in 0..Pack::<S>::PER_BLOCK {
+                    let mut sum = Pack::<S>::splat(simd, 0.0);
+                    for ((c, (column, &x)), &factor) in coordinates.clone().zip(factors) {
+                        let difference = (x - Pack::load(simd, column, at)) * factor;
+                        if !differences.is_empty() {
+                            difference.store(&mut differences[c], at);
+                        }
+                        sum = difference.mul_add(difference, sum);
+                    }
+                    sum.store(squares, at);
                 }
             }
         }
-        sum * kernel.inverse_square_length()
     }
 }
 
-/// The place of a pack of points: number `at` of a block.
+/// The pairs of a query with a block of points.
 #[derive(Clone, Copy)]
-pub(crate) struct PackPlace {
+pub(crate) struct BlockPairs<'a> {
+    pub(crate) kernel: &'a Kernel,
+    /// The query, `[d]`.
+    pub(crate) x: &'a [f64],
+    /// Index of the block.
     pub(crate) block: usize,
-    pub(crate) at: usize,
 }
 
 /// Lays out one number per point like [`Nodes`], with zeros where the last block is padded.

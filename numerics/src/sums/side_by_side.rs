@@ -3,9 +3,9 @@
 use pulp::Simd;
 
 use crate::kernel::Kernel;
-use crate::kernel::in_place::{Covariances, Scaling};
+use crate::kernel::in_place::Scaling;
 use crate::machine::lanes::{Lower, triangle};
-use crate::machine::registers::{BLOCK, Pack};
+use crate::machine::registers::{IN_FLIGHT, Pack};
 
 /// 2⁻⁵⁰⁰. Correlations below this are set to 0, and so are entries of the factor below this times √k₀.
 ///
@@ -52,11 +52,8 @@ impl SideBySide<'_> {
                 }
             }
         }
-        let (scaling, per_block) = (scaling(kernel), BLOCK / S::F64_LANES);
-        for block in 0..triangle(count).div_ceil(per_block) {
-            let entries = &mut lower.registers[block * per_block..][..per_block];
-            kernel.profiles(Covariances { simd, entries, scaling });
-        }
+        let entries = &mut lower.registers[..triangle(count).next_multiple_of(IN_FLIGHT)];
+        scaling(kernel).covariances(simd, kernel.family(), [entries]);
         for i in 0..count {
             let noise = Pack::<S, 1>::of_numbers(simd, self.noise, i);
             lower.set(triangle(i) + i, noise + kernel.at_zero());

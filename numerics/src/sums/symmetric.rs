@@ -5,9 +5,9 @@
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::nodes::{Nodes, PackPlace, blocked};
+use super::nodes::{BlockPairs, Nodes, blocked};
 use crate::error::{NumericsError, Result};
-use crate::kernel::{Kernel, Pairs};
+use crate::kernel::Kernel;
 use crate::machine::registers::{BLOCK, Block, Pack};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
@@ -104,13 +104,19 @@ impl WithSimd for BlockPair<'_> {
         let Self { nodes, kernel, weights, cloud, a: (row, own), b } = self;
         // Each pair of blocks is summed by itself first: adding n terms one after the other would lose a
         // digit.
-        let mut mirrored = Block::ZERO;
+        let (mut mirrored, mut profile) = (Block::ZERO, Block::ZERO);
         let block = b.as_ref().map_or(row, |(block, _)| *block);
         for (at, point) in block_points(cloud, row).enumerate() {
+            let pairs = BlockPairs { kernel, x: cloud.point(point), block };
+            nodes.squared_distances(simd, pairs, &mut profile, &mut []);
+            kernel.profiles(simd, [profile.registers_mut::<S>()]);
+            let weight = Pack::<S, 1>::splat(simd, weights[row].0[at]);
             let mut sum = Pack::<S, 1>::splat(simd, 0.0);
-            let (position, weight) = ((nodes, kernel, cloud.point(point), block), weights[row].0[at]);
-            let (others, sum_here, mirrored) = (&weights[block], &mut sum, &mut mirrored);
-            kernel.profiles(Row::<S> { simd, position, weight, others, sum: sum_here, mirrored });
+            for at in 0..Pack::<S, 1>::PER_BLOCK {
+                let phi = Pack::load(simd, &profile, at);
+                sum = Pack::load(simd, &weights[block], at).mul_add(phi, sum);
+                weight.mul_add(phi, Pack::load(simd, &mirrored, at)).store(&mut mirrored, at);
+            }
             own[0].0[at] += sum.sum_lanes();
         }
         // Within a single block, both points of a pair have been the point of a row already.
@@ -123,34 +129,6 @@ impl WithSimd for BlockPair<'_> {
 /// Returns the indices of the points of a block. The last block may have fewer.
 pub(crate) fn block_points(cloud: &Cloud, block: usize) -> std::ops::Range<usize> {
     block * BLOCK..cloud.n_points().min((block + 1) * BLOCK)
-}
-
-/// The pairs of one point with a block. Adds to the sum of the point and to those of the block's points.
-struct Row<'a, S: Simd> {
-    simd: S,
-    position: (&'a Nodes, &'a Kernel, &'a [f64], usize),
-    weight: f64,
-    others: &'a Block,
-    sum: &'a mut Pack<S, 1>,
-    mirrored: &'a mut Block,
-}
-
-impl<S: Simd> Pairs<S> for Row<'_, S> {
-    type Others = ();
-
-    #[inline(always)]
-    fn pack(&mut self, at: usize) -> (Pack<S>, ()) {
-        let (nodes, kernel, x, block) = self.position;
-        (nodes.scaled_distances(self.simd, PackPlace { block, at }, x, kernel, |_, _| ()), ())
-    }
-
-    #[inline(always)]
-    fn take(&mut self, at: usize, (): (), [phi, ..]: [Pack<S>; 3]) {
-        let others = Pack::load(self.simd, self.others, at);
-        *self.sum = others.add_products_to(phi, *self.sum);
-        let own = Pack::splat(self.simd, self.weight);
-        own.mul_add(phi, Pack::load(self.simd, self.mirrored, at)).store(self.mirrored, at);
-    }
 }
 
 #[cfg(test)]

@@ -37,6 +37,11 @@ pub(crate) struct Block(pub(crate) [f64; BLOCK]);
 
 impl Block {
     pub(crate) const ZERO: Self = Self([0.0; BLOCK]);
+
+    #[inline(always)]
+    pub(crate) fn registers_mut<S: Simd>(&mut self) -> &mut [S::f64s] {
+        S::as_mut_simd_f64s(&mut self.0).0
+    }
 }
 
 /// A pack of `N` registers, i.e. `N · S::F64_LANES` numbers.

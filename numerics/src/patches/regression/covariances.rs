@@ -4,9 +4,8 @@
 use pulp::Simd;
 
 use super::Factored;
-use crate::kernel::in_place::{Covariances, CovariancesAndSlopes};
 use crate::machine::lanes::triangle;
-use crate::machine::registers::{BLOCK, Pack};
+use crate::machine::registers::{BLOCK, IN_FLIGHT, Pack};
 
 /// Variance added to every point besides its noise, relative to k₀. It covers rounding of the heights.
 const NUGGET: f64 = 1e-13;
@@ -29,13 +28,8 @@ impl<S: Simd> Factored<'_, S> {
             }
             self.lower.set(row + i, self.lower.splat(0.0));
         }
-        let per_block = BLOCK / S::F64_LANES;
-        let scaling = self.model.scaling();
-        let n_blocks = triangle(n).div_ceil(per_block);
-        for block in 0..n_blocks {
-            let entries = &mut self.lower.registers[block * per_block..][..per_block];
-            self.model.family.profiles(Covariances { simd: self.lower.simd, entries, scaling });
-        }
+        let entries = &mut self.lower.registers[..triangle(n).next_multiple_of(IN_FLIGHT)];
+        self.model.scaling().covariances(self.lower.simd, self.model.family, [entries]);
         for i in 0..n {
             let (row, mask) = (triangle(i), self.mask(i));
             for j in 0..i {
@@ -123,13 +117,8 @@ impl<S: Simd> Factored<'_, S> {
                 }
                 square.write(&mut q, j - start);
             }
-            self.model.family.profiles(CovariancesAndSlopes {
-                simd: self.lower.simd,
-                entries: &mut q[..per_block],
-                first: &mut first[..per_block],
-                second: &mut second[..per_block],
-                scaling: self.model.scaling(),
-            });
+            let lists = [&mut q, &mut first, &mut second].map(|list| &mut list[..per_block]);
+            self.model.scaling().covariances(self.lower.simd, self.model.family, lists);
             for j in start..end {
                 let mask = self.mask(j);
                 let phi = Pack::<S, 1>::read(self.lower.simd, &q, j - start);

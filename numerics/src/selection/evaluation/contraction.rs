@@ -9,11 +9,11 @@ use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
 use crate::error::Result;
-use crate::kernel::{HUGE, Kernel, Pairs};
+use crate::kernel::{HUGE, Kernel};
 use crate::machine::registers::{BLOCK, Block, Pack};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
-use crate::sums::nodes::{Nodes, PackPlace};
+use crate::sums::nodes::{BlockPairs, Nodes};
 
 /// Columns per task. The columns of a triangle differ in length, which many tasks balance.
 const COLUMNS_PER_TASK: usize = 16;
@@ -124,80 +124,63 @@ impl WithSimd for Columns<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Vec<f64> {
         let Self { of, nodes, columns } = self;
-        let mut sums = vec![Block::ZERO; FIXED + of.n_axes()];
-        let (mut differences, mut weights) = (vec![Block::ZERO; of.n_axes()], Block::ZERO);
+        let mut block_sums = BlockSums {
+            sums: vec![Block::ZERO; FIXED + of.n_axes()],
+            weights: Block::ZERO,
+            squares: Block::ZERO,
+            profiles: [Block::ZERO; 2],
+            differences: vec![Block::ZERO; of.n_axes()],
+        };
         for j in columns {
             let x = of.cloud.point(j);
             for block in j / BLOCK..of.cloud.n_points().div_ceil(BLOCK) {
-                of.weights.fill(j, block, &mut weights);
-                of.kernel.profiles(ColumnPairs {
-                    simd,
-                    nodes,
-                    kernel: of.kernel,
-                    block,
-                    x,
-                    weights: &weights,
-                    differences: &mut differences,
-                    sums: &mut sums,
-                });
+                of.weights.fill(j, block, &mut block_sums.weights);
+                block_sums.add(simd, nodes, BlockPairs { kernel: of.kernel, x, block });
             }
         }
-        sums.iter().map(|sum| sum.0.iter().sum()).collect()
+        block_sums.sums.iter().map(|sum| sum.0.iter().sum()).collect()
     }
 }
 
-/// A block of rows of one column.
-struct ColumnPairs<'a, S> {
-    simd: S,
-    nodes: &'a Nodes,
-    kernel: &'a Kernel,
-    block: usize,
-    x: &'a [f64],
-    weights: &'a Block,
-    differences: &'a mut [Block],
-    sums: &'a mut [Block],
+/// Sums over the columns so far, and the block of rows at hand.
+struct BlockSums {
+    sums: Vec<Block>,
+    /// Entries of G.
+    weights: Block,
+    /// `|D|²`.
+    squares: Block,
+    /// φ and φ′.
+    profiles: [Block; 2],
+    /// Entries of D, or empty if no sums of single axes are wanted.
+    differences: Vec<Block>,
 }
 
-impl<S: Simd> ColumnPairs<'_, S> {
-    /// Adds `a · b` to a sum, element by element.
+impl BlockSums {
+    /// Adds the contributions of a block of rows of one column, whose weights are at hand.
     #[inline(always)]
-    fn add(&mut self, sum: usize, at: usize, a: Pack<S>, b: Pack<S>) {
-        let sum = &mut self.sums[sum];
-        a.mul_add(b, Pack::load(self.simd, sum, at)).store(sum, at);
-    }
-}
-
-impl<S: Simd> Pairs<S> for ColumnPairs<'_, S> {
-    /// The scaled squared distances q.
-    type Others = Pack<S>;
-
-    #[inline(always)]
-    fn pack(&mut self, at: usize) -> (Pack<S>, Pack<S>) {
-        let place = PackPlace { block: self.block, at };
-        let q = if self.differences.is_empty() {
-            self.nodes.scaled_distances(self.simd, place, self.x, self.kernel, |_, _| ())
-        } else {
-            // The closure must stay this small: a larger one is not inlined, which turns every instruction
-            // into a call.
-            let differences = &mut *self.differences;
-            self.nodes.scaled_distances(self.simd, place, self.x, self.kernel, |c, difference| {
-                difference.store(&mut differences[c], at);
-            })
-        };
-        // A slope of 0 times an infinite q would be NaN.
-        (q, q.at_most(HUGE))
-    }
-
-    #[inline(always)]
-    fn take(&mut self, at: usize, q: Pack<S>, [value, slope, _]: [Pack<S>; 3]) {
-        let weight = Pack::load(self.simd, self.weights, at);
-        let slope = weight * slope;
-        self.add(0, at, weight, value);
-        self.add(1, at, slope, Pack::splat(self.simd, 1.0));
-        self.add(2, at, slope, q);
-        for c in 0..self.differences.len() {
-            let difference = Pack::load(self.simd, &self.differences[c], at);
-            self.add(FIXED + c, at, slope, (difference * difference).at_most(HUGE));
+    fn add<S: Simd>(&mut self, simd: S, nodes: &Nodes, pairs: BlockPairs<'_>) {
+        let Self { sums, weights, squares, profiles, differences } = self;
+        nodes.squared_distances(simd, pairs, squares, differences);
+        profiles[0] = *squares;
+        pairs.kernel.profiles(simd, profiles.each_mut().map(Block::registers_mut::<S>));
+        for at in 0..Pack::<S>::PER_BLOCK {
+            let weight = Pack::<S>::load(simd, weights, at);
+            let slope = weight * Pack::load(simd, &profiles[1], at);
+            // A slope of 0 times an infinite q would be NaN.
+            let q = (Pack::load(simd, squares, at) * pairs.kernel.inverse_square_length()).at_most(HUGE);
+            add_products(&mut sums[0], at, weight, Pack::load(simd, &profiles[0], at));
+            add_products(&mut sums[1], at, slope, Pack::splat(simd, 1.0));
+            add_products(&mut sums[2], at, slope, q);
+            for (sum, difference) in sums[FIXED..].iter_mut().zip(&*differences) {
+                let difference = Pack::load(simd, difference, at);
+                add_products(sum, at, slope, (difference * difference).at_most(HUGE));
+            }
         }
     }
+}
+
+/// Adds `a · b` to pack `at` of a sum, element by element.
+#[inline(always)]
+fn add_products<S: Simd>(sum: &mut Block, at: usize, a: Pack<S>, b: Pack<S>) {
+    a.mul_add(b, Pack::load(a.simd(), sum, at)).store(sum, at);
 }

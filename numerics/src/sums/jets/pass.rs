@@ -4,10 +4,10 @@ use pulp::{Simd, WithSimd};
 
 use super::tiles::{ProfileBlock, Sum};
 use super::{JetOrder, Layout};
-use crate::kernel::{Kernel, Pairs};
-use crate::machine::registers::{Block, Pack};
+use crate::kernel::Kernel;
+use crate::machine::registers::Block;
 use crate::points::cloud::Cloud;
-use crate::sums::nodes::{Nodes, PackPlace};
+use crate::sums::nodes::{BlockPairs, Nodes};
 
 /// The function `Σ_j λ_j k(·, x_j)`, with points and weights laid out in blocks.
 #[derive(Clone, Copy)]
@@ -52,8 +52,7 @@ impl Pass<'_> {
             for block in 0..expansion.weights.len() {
                 sums.add::<ORDER>(simd, expansion, block, x);
                 if has_magnitudes {
-                    let weights = &expansion.weights[block];
-                    sums.block.add_magnitudes(simd, weights, kernel, &mut sums.magnitudes);
+                    sums.add_magnitudes(simd, &expansion.weights[block], kernel);
                 }
             }
             sums.write::<ORDER>(&mut numbers);
@@ -71,15 +70,15 @@ impl Pass<'_> {
 /// The sums of a pass for one query, and the block at hand.
 pub(super) struct Sums<S: Simd> {
     /// `Σλφ`.
-    value: Sum<S>,
+    pub(super) value: Sum<S>,
     /// `Σλφ′`, which enters the whole diagonal of the Hessian.
-    trace: Sum<S>,
+    pub(super) trace: Sum<S>,
     /// `Σ|λ|φ` and `Σ|λφ′|√q`.
-    magnitudes: [Sum<S>; 2],
+    pub(super) magnitudes: [Sum<S>; 2],
     /// `Σλφ′D_a`.
-    gradient: Vec<Sum<S>>,
+    pub(super) gradient: Vec<Sum<S>>,
     /// `Σλφ″D_aD_b`, a ≤ b, row by row.
-    hessian: Vec<Sum<S>>,
+    pub(super) hessian: Vec<Sum<S>>,
     pub(super) block: ProfileBlock,
 }
 
@@ -114,11 +113,9 @@ impl<S: Simd> Sums<S> {
         block: usize,
         x: &[f64],
     ) {
-        expansion.kernel.profiles(Weighted::<S, ORDER> { simd, expansion, block, x, sums: self });
-        if ORDER >= 1 {
-            let weights = &expansion.weights[block];
-            self.block.add_to::<S, ORDER>(simd, weights, &mut self.gradient, &mut self.hessian);
-        }
+        let Expansion { nodes, kernel, weights } = expansion;
+        self.block.fill::<S, ORDER>(simd, nodes, BlockPairs { kernel, x, block });
+        self.add_block::<ORDER>(simd, &weights[block]);
     }
 
     /// Writes the sums up to an order, in the sequence that [`Layout::finish`] takes.
@@ -139,51 +136,5 @@ impl<S: Simd> Sums<S> {
             *number = sum.sum_lanes();
         }
         numbers[1 + d + self.hessian.len()] = self.trace.sum_lanes();
-    }
-}
-
-/// Computes a block's differences and profiles, and adds up the sums that need no difference.
-struct Weighted<'a, S: Simd, const ORDER: usize> {
-    simd: S,
-    expansion: Expansion<'a>,
-    block: usize,
-    x: &'a [f64],
-    sums: &'a mut Sums<S>,
-}
-
-impl<S: Simd, const ORDER: usize> Pairs<S> for Weighted<'_, S, ORDER> {
-    type Others = ();
-
-    #[inline(always)]
-    fn pack(&mut self, at: usize) -> (Pack<S>, ()) {
-        let Expansion { nodes, kernel, .. } = self.expansion;
-        let differences = &mut self.sums.block.differences;
-        let q = nodes.scaled_distances(
-            self.simd,
-            PackPlace { block: self.block, at },
-            self.x,
-            kernel,
-            |c, difference| {
-                if ORDER >= 1 {
-                    difference.store(&mut differences[c], at);
-                }
-            },
-        );
-        (q, ())
-    }
-
-    #[inline(always)]
-    fn take(&mut self, at: usize, (): (), [phi, slope, bend]: [Pack<S>; 3]) {
-        let weight = Pack::load(self.simd, &self.expansion.weights[self.block], at);
-        let sums = &mut *self.sums;
-        sums.value = weight.add_products_to(phi, sums.value);
-        if ORDER >= 1 {
-            slope.store(&mut sums.block.profiles[1], at);
-        }
-        if ORDER >= 2 {
-            sums.trace = weight.add_products_to(slope, sums.trace);
-            phi.store(&mut sums.block.profiles[0], at);
-            bend.store(&mut sums.block.profiles[2], at);
-        }
     }
 }

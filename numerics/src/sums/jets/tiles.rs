@@ -6,8 +6,10 @@
 
 use pulp::Simd;
 
+use super::pass::Sums;
 use crate::kernel::{HUGE, Kernel, distance_and_inverse};
 use crate::machine::registers::{Block, Pack};
+use crate::sums::nodes::{BlockPairs, Nodes};
 
 /// Coordinates per tile.
 const TILE: usize = 3;
@@ -27,57 +29,82 @@ impl ProfileBlock {
         Self { profiles: [Block::ZERO; 3], differences: vec![Block::ZERO; dimension] }
     }
 
-    /// Adds `Σ λφ′ D_a` to `gradient[a]`. At order 2, also adds `Σ λφ″ D_a D_b` to the upper triangle
-    /// `hessian`, packed row by row.
+    /// Computes the differences and profiles of a query with a block of points.
     #[inline(always)]
-    pub(super) fn add_to<S: Simd, const ORDER: usize>(
-        &self,
+    pub(super) fn fill<S: Simd, const ORDER: usize>(
+        &mut self,
         simd: S,
-        weights: &Block,
-        gradient: &mut [Sum<S>],
-        hessian: &mut [Sum<S>],
+        nodes: &Nodes,
+        pairs: BlockPairs<'_>,
     ) {
-        let mut hessian = Triangle { packed: hessian, dimension: self.differences.len() };
-        for a in (0..self.differences.len()).step_by(TILE) {
-            match self.differences.len() - a {
-                1 => self.add_diagonal_tile::<S, ORDER, 1>(simd, weights, a, gradient, &mut hessian),
-                2 => self.add_diagonal_tile::<S, ORDER, 2>(simd, weights, a, gradient, &mut hessian),
-                _ => self.add_diagonal_tile::<S, ORDER, TILE>(simd, weights, a, gradient, &mut hessian),
+        let Self { profiles: [phi, slope, bend], differences } = self;
+        let differences = if ORDER == 0 { &mut [] } else { &mut differences[..] };
+        nodes.squared_distances(simd, pairs, phi, differences);
+        let (phi, kernel) = (phi.registers_mut::<S>(), pairs.kernel);
+        match ORDER {
+            0 => kernel.profiles(simd, [phi]),
+            1 => kernel.profiles(simd, [phi, slope.registers_mut::<S>()]),
+            _ => kernel.profiles(simd, [phi, slope.registers_mut::<S>(), bend.registers_mut::<S>()]),
+        }
+    }
+}
+
+impl<S: Simd> Sums<S> {
+    /// Adds the contributions of a block, whose differences and profiles are at hand.
+    #[inline(always)]
+    pub(super) fn add_block<const ORDER: usize>(&mut self, simd: S, weights: &Block) {
+        if ORDER == 0 {
+            return self.add_values(simd, weights);
+        }
+        let d = self.gradient.len();
+        for a in (0..d).step_by(TILE) {
+            match d - a {
+                1 => self.add_diagonal_tile::<ORDER, 1>(simd, weights, a),
+                2 => self.add_diagonal_tile::<ORDER, 2>(simd, weights, a),
+                _ => self.add_diagonal_tile::<ORDER, TILE>(simd, weights, a),
             }
             if ORDER < 2 {
                 continue;
             }
-            for b in (a + TILE..self.differences.len()).step_by(TILE) {
-                match self.differences.len() - b {
-                    1 => self.add_tile::<S, 1>(simd, weights, a, b, &mut hessian),
-                    2 => self.add_tile::<S, 2>(simd, weights, a, b, &mut hessian),
-                    _ => self.add_tile::<S, TILE>(simd, weights, a, b, &mut hessian),
+            for b in (a + TILE..d).step_by(TILE) {
+                match d - b {
+                    1 => self.add_tile::<1>(simd, weights, a, b),
+                    2 => self.add_tile::<2>(simd, weights, a, b),
+                    _ => self.add_tile::<TILE>(simd, weights, a, b),
                 }
             }
         }
     }
 
+    /// Adds `Σλφ` alone.
+    #[inline(always)]
+    fn add_values(&mut self, simd: S, weights: &Block) {
+        let mut value = self.value;
+        for at in 0..Sum::<S>::PER_BLOCK {
+            let phi = Sum::load(simd, &self.block.profiles[0], at);
+            value = Sum::load(simd, weights, at).mul_add(phi, value);
+        }
+        self.value = value;
+    }
+
     /// Adds to the entries `a..a + N` of the gradient, and to those of the Hessian between these coordinates.
+    /// With the first coordinates it also adds the sums that need no difference.
     #[expect(
         clippy::needless_range_loop,
         reason = "a slice of the sums would keep them in memory, half as fast"
     )]
     #[inline(always)]
-    fn add_diagonal_tile<S: Simd, const ORDER: usize, const N: usize>(
-        &self,
-        simd: S,
-        weights: &Block,
-        a: usize,
-        gradient: &mut [Sum<S>],
-        hessian: &mut Triangle<Sum<S>>,
-    ) {
+    fn add_diagonal_tile<const ORDER: usize, const N: usize>(&mut self, simd: S, weights: &Block, a: usize) {
         let zero = Sum::splat(simd, 0.0);
-        let (mut slopes, mut products) = ([zero; N], [[zero; N]; N]);
-        let differences = &self.differences[a..a + N];
+        let (mut value, mut trace, mut slopes, mut products) = (zero, zero, [zero; N], [[zero; N]; N]);
+        let ProfileBlock { profiles, differences } = &self.block;
+        let differences = &differences[a..a + N];
         for at in 0..Sum::<S>::PER_BLOCK {
             let weight = Sum::load(simd, weights, at);
-            let first = weight * Sum::load(simd, &self.profiles[1], at);
-            let second = weight * Sum::load(simd, &self.profiles[2], at);
+            let first = weight * Sum::load(simd, &profiles[1], at);
+            let second = weight * Sum::load(simd, &profiles[2], at);
+            value = weight.mul_add(Sum::load(simd, &profiles[0], at), value);
+            trace = trace + first;
             for i in 0..N {
                 let difference = Sum::load(simd, &differences[i], at);
                 slopes[i] = first.mul_add(difference, slopes[i]);
@@ -90,11 +117,14 @@ impl ProfileBlock {
                 }
             }
         }
+        if a == 0 {
+            (self.value, self.trace) = (self.value + value, self.trace + trace);
+        }
         for i in 0..N {
-            gradient[a + i] = gradient[a + i] + slopes[i];
+            self.gradient[a + i] = self.gradient[a + i] + slopes[i];
             if ORDER >= 2 {
                 for j in i..N {
-                    hessian.add(a + i, a + j, products[i][j]);
+                    self.add_to_hessian(a + i, a + j, products[i][j]);
                 }
             }
         }
@@ -106,18 +136,12 @@ impl ProfileBlock {
         reason = "a slice of the sums would keep them in memory, half as fast"
     )]
     #[inline(always)]
-    fn add_tile<S: Simd, const N: usize>(
-        &self,
-        simd: S,
-        weights: &Block,
-        a: usize,
-        b: usize,
-        hessian: &mut Triangle<Sum<S>>,
-    ) {
+    fn add_tile<const N: usize>(&mut self, simd: S, weights: &Block, a: usize, b: usize) {
         let mut products = [[Sum::splat(simd, 0.0); N]; TILE];
-        let (rows, columns) = (&self.differences[a..a + TILE], &self.differences[b..b + N]);
+        let ProfileBlock { profiles, differences } = &self.block;
+        let (rows, columns) = (&differences[a..a + TILE], &differences[b..b + N]);
         for at in 0..Sum::<S>::PER_BLOCK {
-            let second = Sum::load(simd, weights, at) * Sum::load(simd, &self.profiles[2], at);
+            let second = Sum::load(simd, weights, at) * Sum::load(simd, &profiles[2], at);
             for i in 0..TILE {
                 let weighted = second * Sum::load(simd, &rows[i], at);
                 for j in 0..N {
@@ -127,8 +151,33 @@ impl ProfileBlock {
         }
         for i in 0..TILE {
             for j in 0..N {
-                hessian.add(a + i, b + j, products[i][j]);
+                self.add_to_hessian(a + i, b + j, products[i][j]);
             }
+        }
+    }
+
+    #[inline(always)]
+    fn add_to_hessian(&mut self, a: usize, b: usize, sum: Sum<S>) {
+        let entry = &mut self.hessian[a * self.gradient.len() - a * (a + 1) / 2 + b];
+        *entry = *entry + sum;
+    }
+
+    /// Adds `Σ|λ|φ` and `Σ|λφ′|√q` to the magnitudes.
+    #[inline(always)]
+    pub(super) fn add_magnitudes(&mut self, simd: S, weights: &Block, kernel: &Kernel) {
+        let ProfileBlock { profiles, differences } = &self.block;
+        for at in 0..Sum::<S>::PER_BLOCK {
+            let weight = Sum::load(simd, weights, at).abs();
+            let phi = Sum::load(simd, &profiles[0], at);
+            let slope = Sum::load(simd, &profiles[1], at);
+            let mut square = Sum::splat(simd, 0.0);
+            for differences in differences {
+                let difference = Sum::load(simd, differences, at);
+                square = difference.mul_add(difference, square);
+            }
+            self.magnitudes[0] = weight.mul_add(phi, self.magnitudes[0]);
+            let (distance, _) = distance_and_inverse(square * kernel.inverse_square_length(), HUGE);
+            self.magnitudes[1] = (-(weight * slope)).mul_add(distance, self.magnitudes[1]);
         }
     }
 }
@@ -179,44 +228,4 @@ fn add_products<S: Simd>(simd: S, at: usize, a: [Sum<S>; 2], b: [Sum<S>; 2], blo
         sum = a[k].mul_add(b[k], sum);
     }
     sum.store(block, at);
-}
-
-impl ProfileBlock {
-    /// Adds `Σ|λ|φ` and `Σ|λφ′|√q` to `magnitudes`.
-    #[inline(always)]
-    pub(super) fn add_magnitudes<S: Simd>(
-        &self,
-        simd: S,
-        weights: &Block,
-        kernel: &Kernel,
-        magnitudes: &mut [Sum<S>; 2],
-    ) {
-        for at in 0..Sum::<S>::PER_BLOCK {
-            let weight = Sum::load(simd, weights, at).abs();
-            let phi = Sum::load(simd, &self.profiles[0], at);
-            let slope = Sum::load(simd, &self.profiles[1], at);
-            let mut square = Sum::splat(simd, 0.0);
-            for differences in &self.differences {
-                let difference = Sum::load(simd, differences, at);
-                square = difference.mul_add(difference, square);
-            }
-            magnitudes[0] = weight.mul_add(phi, magnitudes[0]);
-            let (distance, _) = distance_and_inverse(square * kernel.inverse_square_length(), HUGE);
-            magnitudes[1] = (-(weight * slope)).mul_add(distance, magnitudes[1]);
-        }
-    }
-}
-
-/// The upper triangle of a symmetric matrix, row by row.
-struct Triangle<'a, T> {
-    packed: &'a mut [T],
-    dimension: usize,
-}
-
-impl<S: Simd> Triangle<'_, Sum<S>> {
-    #[inline(always)]
-    fn add(&mut self, a: usize, b: usize, sum: Sum<S>) {
-        let entry = &mut self.packed[a * self.dimension - a * (a + 1) / 2 + b];
-        *entry = *entry + sum;
-    }
 }

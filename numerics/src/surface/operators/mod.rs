@@ -21,7 +21,7 @@ use super::curvature::tangential_trace;
 use super::geometry::Geometry;
 use crate::error::{NumericsError, Quantity, Result, SolverKind};
 use crate::function::interpolant::Interpolant;
-use crate::kernel::{Kernel, Pairs};
+use crate::kernel::Kernel;
 use crate::machine::registers::{BLOCK, Block, Pack};
 use crate::machine::vector::dot;
 use crate::observer::{Observer, Stage};
@@ -29,7 +29,7 @@ use crate::points::cloud::Cloud;
 use crate::solver::trend::{Basis, Mean};
 use crate::solver::{Method, Solver};
 use crate::sums::jets::{JetOrder, Jets, check_smooth_at};
-use crate::sums::nodes::{Nodes, PackPlace};
+use crate::sums::nodes::{BlockPairs, Nodes};
 pub(crate) use doubts::JUDGED_FUNCTIONALS;
 pub use doubts::Judged;
 pub use kriged::{Kriged, OfKriged};
@@ -279,104 +279,82 @@ impl WithSimd for Row<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let mut out = Block::ZERO;
+        let Self { nodes, kernel, x, .. } = self;
+        let mut differences = vec![Block::ZERO; x.len()];
+        let mut profiles = [Block::ZERO; 3];
         for block in 0..self.row.len().div_ceil(BLOCK) {
-            let pairs = RowPairs { simd, row: &self, block, out: &mut out };
-            match self.operator {
-                Operator::SurfaceGradient => self.kernel.profiles(SurfaceGradientPairs(pairs)),
-                Operator::LaplaceBeltrami => self.kernel.profiles(LaplaceBeltramiPairs(pairs)),
-            }
+            nodes.squared_distances(
+                simd,
+                BlockPairs { kernel, x, block },
+                &mut profiles[0],
+                &mut differences,
+            );
+            kernel.profiles(simd, profiles.each_mut().map(Block::registers_mut::<S>));
             let start = block * BLOCK;
             let end = (start + BLOCK).min(self.row.len());
+            let out = match self.operator {
+                Operator::SurfaceGradient => self.of_surface_gradient(simd, &differences, &profiles),
+                Operator::LaplaceBeltrami => self.of_laplace_beltrami(simd, &differences, &profiles),
+            };
             self.row[start..end].copy_from_slice(&out.0[..end - start]);
         }
     }
 }
 
-/// A block of a row.
-struct RowPairs<'a, S> {
-    simd: S,
-    row: &'a Row<'a>,
-    block: usize,
-    out: &'a mut Block,
-}
-
-impl<S: Simd> RowPairs<'_, S> {
-    /// Returns q and a = ν·D of a pack. `each` receives the entries of D.
+impl Row<'_> {
+    /// Returns a = ν·D and |D|² of a pack.
     #[inline(always)]
-    fn along(&self, at: usize, mut each: impl FnMut(usize, Pack<S>)) -> (Pack<S>, Pack<S>) {
-        let Row { nodes, kernel, geometry, query, x, .. } = *self.row;
-        let normal = geometry.normal(query);
-        let mut along = Pack::splat(self.simd, 0.0);
-        let q = nodes.scaled_distances(
-            self.simd,
-            PackPlace { block: self.block, at },
-            x,
-            kernel,
-            |c, stretched| {
-                let difference = stretched * kernel.stretch(c);
-                along = difference.mul_add(Pack::splat(self.simd, normal[c]), along);
-                each(c, difference);
-            },
-        );
-        (q, along)
-    }
-}
-
-struct SurfaceGradientPairs<'a, S>(RowPairs<'a, S>);
-
-impl<S: Simd> Pairs<S> for SurfaceGradientPairs<'_, S> {
-    type Others = Pack<S>;
-
-    /// Returns q, and component c of D − aν for `take`.
-    #[inline(always)]
-    fn pack(&mut self, at: usize) -> (Pack<S>, Pack<S>) {
-        let Self(pairs) = self;
-        let Row { component, geometry, query, .. } = *pairs.row;
-        let mut own = Pack::splat(pairs.simd, 0.0);
-        let (q, along) = pairs.along(at, |c, difference| {
-            if c == component {
-                own = difference;
-            }
-        });
-        (q, own - along * geometry.normal(query)[component])
-    }
-
-    #[inline(always)]
-    fn take(&mut self, at: usize, tangential: Pack<S>, [_, slope, _]: [Pack<S>; 3]) {
-        let kernel = self.0.row.kernel;
-        let factor = 2.0 * kernel.variance() * kernel.inverse_square_length();
-        (factor * slope * tangential).store(self.0.out, at);
-    }
-}
-
-struct LaplaceBeltramiPairs<'a, S>(RowPairs<'a, S>);
-
-impl<S: Simd> Pairs<S> for LaplaceBeltramiPairs<'_, S> {
-    type Others = (Pack<S>, Pack<S>);
-
-    /// Returns q, and |D|²/ℓ² and a for `take`.
-    #[inline(always)]
-    fn pack(&mut self, at: usize) -> (Pack<S>, Self::Others) {
-        let Row { kernel, .. } = *self.0.row;
-        if !kernel.is_stretched() {
-            let (q, along) = self.0.along(at, |_, _| ());
-            return (q, (q, along));
+    fn along<S: Simd>(&self, simd: S, differences: &[Block], at: usize) -> (Pack<S>, Pack<S>) {
+        let normal = self.geometry.normal(self.query);
+        let (mut along, mut square) = (Pack::splat(simd, 0.0), Pack::splat(simd, 0.0));
+        for (c, stretched) in differences.iter().enumerate() {
+            let difference = Pack::load(simd, stretched, at) * self.kernel.stretch(c);
+            along = difference.mul_add(Pack::splat(simd, normal[c]), along);
+            square = difference.mul_add(difference, square);
         }
-        let mut square = Pack::splat(self.0.simd, 0.0);
-        let (q, along) = self.0.along(at, |_, difference| square = difference.mul_add(difference, square));
-        (q, (square * kernel.inverse_square_length(), along))
+        (along, square)
     }
 
     #[inline(always)]
-    fn take(&mut self, at: usize, (square, along): Self::Others, [_, slope, bend]: [Pack<S>; 3]) {
-        let Row { kernel, geometry, query, tangential_trace, .. } = *self.0.row;
+    fn of_surface_gradient<S: Simd>(
+        &self,
+        simd: S,
+        differences: &[Block],
+        [_, slope, _]: &[Block; 3],
+    ) -> Block {
+        let Self { kernel, component, .. } = *self;
+        let normal = self.geometry.normal(self.query)[component];
+        let factor = 2.0 * kernel.variance() * kernel.inverse_square_length();
+        let mut out = Block::ZERO;
+        for at in 0..Pack::<S>::PER_BLOCK {
+            let (along, _) = self.along(simd, differences, at);
+            let own = Pack::load(simd, &differences[component], at) * kernel.stretch(component);
+            let tangential = own - along * normal;
+            (factor * Pack::load(simd, slope, at) * tangential).store(&mut out, at);
+        }
+        out
+    }
+
+    #[inline(always)]
+    fn of_laplace_beltrami<S: Simd>(
+        &self,
+        simd: S,
+        differences: &[Block],
+        [_, slope, bend]: &[Block; 3],
+    ) -> Block {
+        let Self { kernel, geometry, query, tangential_trace, .. } = *self;
         let inverse_square = kernel.inverse_square_length();
         let first = 2.0 * kernel.variance() * inverse_square;
-        // (|D|² − a²)/ℓ².
-        let tangential = square - along * along * inverse_square;
-        let turned = tangential_trace - along * geometry.trace_of_shape_operator(query);
-        (2.0 * first * bend).mul_add(tangential, first * slope * turned).store(self.0.out, at);
+        let mut out = Block::ZERO;
+        for at in 0..Pack::<S>::PER_BLOCK {
+            let (along, square) = self.along(simd, differences, at);
+            // (|D|² − a²)/ℓ².
+            let tangential = square * inverse_square - along * along * inverse_square;
+            let turned = tangential_trace - along * geometry.trace_of_shape_operator(query);
+            let of_slope = first * Pack::load(simd, slope, at) * turned;
+            (2.0 * first * Pack::load(simd, bend, at)).mul_add(tangential, of_slope).store(&mut out, at);
+        }
+        out
     }
 }
 

@@ -5,8 +5,7 @@ use pulp::Simd;
 use super::Factored;
 use crate::function::local_kriging::batch::Batch;
 use crate::function::local_kriging::parts::{CROSS, QUANTITIES, VALUES};
-use crate::kernel::in_place::{Covariances, CovariancesAndSlopes};
-use crate::machine::registers::BLOCK;
+use crate::machine::registers::IN_FLIGHT;
 use crate::sums::side_by_side::{SideBySide, scaling};
 
 impl<S: Simd> Factored<'_, S> {
@@ -31,20 +30,16 @@ impl<S: Simd> Factored<'_, S> {
             self.lower.set(cross + j, square);
             self.lower.set(values + j, self.of(&self.batch.values, j));
         }
-        let (length, slopes) = (self.n.next_multiple_of(BLOCK), self.row(self.parts.slopes()));
-        let (simd, scaling) = (self.lower.simd, scaling(self.kernel));
-        for block in 0..self.n.div_ceil(Self::PER_BLOCK) {
-            let at = block * Self::PER_BLOCK;
-            let (rows, rest) = self.lower.registers.split_at_mut(slopes);
-            let entries = &mut rows[cross + at..][..Self::PER_BLOCK];
-            if self.parts.order == 0 {
-                self.kernel.profiles(Covariances { simd, entries, scaling });
-                continue;
-            }
-            let (slopes, bends) = rest.split_at_mut(length);
-            let first = &mut slopes[at..][..Self::PER_BLOCK];
-            let second = &mut bends[at..][..Self::PER_BLOCK];
-            self.kernel.profiles(CovariancesAndSlopes { simd, entries, first, second, scaling });
+        let (length, slopes) = (self.n.next_multiple_of(IN_FLIGHT), self.row(self.parts.slopes()));
+        let (bends, simd) = (self.row(self.parts.slopes() + 1), self.lower.simd);
+        let (scaling, family) = (scaling(self.kernel), self.kernel.family());
+        let (rows, rest) = self.lower.registers.split_at_mut(slopes);
+        let entries = &mut rows[cross..][..length];
+        if self.parts.order == 0 {
+            scaling.covariances(simd, family, [entries]);
+        } else {
+            let (first, second) = rest.split_at_mut(bends - slopes);
+            scaling.covariances(simd, family, [entries, &mut first[..length], &mut second[..length]]);
         }
         for j in self.batch.count..self.n {
             self.lower.set(cross + j, self.lower.splat(0.0));

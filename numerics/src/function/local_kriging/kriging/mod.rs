@@ -17,7 +17,7 @@ use super::batch::Batch;
 use super::parts::Parts;
 use crate::kernel::Kernel;
 use crate::machine::lanes::{self, COLUMNS, Layout, Lower, MAX_LANES};
-use crate::machine::registers::{BLOCK, Pack};
+use crate::machine::registers::Pack;
 use rounding::Guarded;
 
 /// Buffers for one batch.
@@ -74,8 +74,6 @@ struct Factored<'a, S: Simd> {
 }
 
 impl<S: Simd> Factored<'_, S> {
-    const PER_BLOCK: usize = BLOCK / S::F64_LANES;
-
     #[inline(always)]
     fn factorize(&mut self) {
         let solved = self.n..self.n + self.parts.n_solved();
