@@ -5,8 +5,8 @@ use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::Layout;
-use super::pass::{Expansion, Sums};
 use super::tiles::mirror;
+use super::totals::{Expansion, Sums};
 use crate::error::{NumericsError, Result};
 use crate::machine::registers::{BLOCK, Block};
 use crate::observer::Observer;

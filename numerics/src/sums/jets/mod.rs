@@ -5,6 +5,7 @@
 mod centres;
 mod pass;
 mod tiles;
+mod totals;
 
 use rayon::prelude::*;
 
@@ -16,7 +17,8 @@ use crate::machine::small::{Small, zeros};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::points::duplicates::Positions;
-use pass::{Expansion, Pass};
+use pass::Pass;
+use totals::Expansion;
 
 /// Queries per task. A task of one query at n = 2,000 is about 5 µs of work.
 const QUERIES_PER_TASK: usize = 8;

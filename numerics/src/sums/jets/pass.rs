@@ -2,20 +2,9 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::tiles::{ProfileBlock, Sum};
+use super::totals::{Expansion, Sums};
 use super::{JetOrder, Layout};
-use crate::kernel::Kernel;
-use crate::machine::registers::Block;
 use crate::points::cloud::Cloud;
-use crate::sums::nodes::{BlockPairs, Nodes};
-
-/// The function `Σ_j λ_j k(·, x_j)`, with points and weights laid out in blocks.
-#[derive(Clone, Copy)]
-pub(super) struct Expansion<'a> {
-    pub(super) nodes: &'a Nodes,
-    pub(super) kernel: &'a Kernel,
-    pub(super) weights: &'a [Block],
-}
 
 /// A pass that computes the jets of the queries from `first` on.
 pub(super) struct Pass<'a> {
@@ -64,77 +53,5 @@ impl Pass<'_> {
                 *slope = 2.0 * variance * sums.magnitudes[1].sum_lanes() * inverse;
             }
         }
-    }
-}
-
-/// The sums of a pass for one query, and the block at hand.
-pub(super) struct Sums<S: Simd> {
-    /// `Σλφ`.
-    pub(super) value: Sum<S>,
-    /// `Σλφ′`, which enters the whole diagonal of the Hessian.
-    pub(super) trace: Sum<S>,
-    /// `Σ|λ|φ` and `Σ|λφ′|√q`.
-    pub(super) magnitudes: [Sum<S>; 2],
-    /// `Σλφ′D_a`.
-    pub(super) gradient: Vec<Sum<S>>,
-    /// `Σλφ″D_aD_b`, a ≤ b, row by row.
-    pub(super) hessian: Vec<Sum<S>>,
-    pub(super) block: ProfileBlock,
-}
-
-impl<S: Simd> Sums<S> {
-    #[inline(always)]
-    pub(super) fn new(simd: S, d: usize) -> Self {
-        let zero = Sum::splat(simd, 0.0);
-        Self {
-            value: zero,
-            trace: zero,
-            magnitudes: [zero; 2],
-            gradient: vec![zero; d],
-            hessian: vec![zero; d * (d + 1) / 2],
-            block: ProfileBlock::zero(d),
-        }
-    }
-
-    #[inline(always)]
-    pub(super) fn clear(&mut self, simd: S) {
-        let zero = Sum::splat(simd, 0.0);
-        (self.value, self.trace, self.magnitudes) = (zero, zero, [zero; 2]);
-        self.gradient.fill(zero);
-        self.hessian.fill(zero);
-    }
-
-    /// Adds the contributions of the points of a block to the sums at x.
-    #[inline(always)]
-    pub(super) fn add<const ORDER: usize>(
-        &mut self,
-        simd: S,
-        expansion: Expansion<'_>,
-        block: usize,
-        x: &[f64],
-    ) {
-        let Expansion { nodes, kernel, weights } = expansion;
-        self.block.fill::<S, ORDER>(simd, nodes, BlockPairs { kernel, x, block });
-        self.add_block::<ORDER>(simd, &weights[block]);
-    }
-
-    /// Writes the sums up to an order, in the sequence that [`Layout::finish`] takes.
-    #[inline(always)]
-    pub(super) fn write<const ORDER: usize>(&self, numbers: &mut [f64]) {
-        let d = self.gradient.len();
-        numbers[0] = self.value.sum_lanes();
-        if ORDER == 0 {
-            return;
-        }
-        for (number, sum) in numbers[1..].iter_mut().zip(&self.gradient) {
-            *number = sum.sum_lanes();
-        }
-        if ORDER == 1 {
-            return;
-        }
-        for (number, sum) in numbers[1 + d..].iter_mut().zip(&self.hessian) {
-            *number = sum.sum_lanes();
-        }
-        numbers[1 + d + self.hessian.len()] = self.trace.sum_lanes();
     }
 }

@@ -6,50 +6,29 @@
 
 use pulp::Simd;
 
-use super::pass::Sums;
+use super::totals::{Expansion, ProfileBlock, Sum, Sums};
 use crate::kernel::{HUGE, Kernel, distance_and_inverse};
-use crate::machine::registers::{Block, Pack};
-use crate::sums::nodes::{BlockPairs, Nodes};
+use crate::machine::registers::Block;
+use crate::sums::nodes::BlockPairs;
 
 /// Coordinates per tile.
 const TILE: usize = 3;
 
-/// A sum in one register.
-pub(super) type Sum<S> = Pack<S, 1>;
-
-/// The profiles of one query with a block of points, and the differences D.
-pub(super) struct ProfileBlock {
-    /// φ, φ′, φ″.
-    pub(super) profiles: [Block; 3],
-    pub(super) differences: Vec<Block>,
-}
-
-impl ProfileBlock {
-    pub(super) fn zero(dimension: usize) -> Self {
-        Self { profiles: [Block::ZERO; 3], differences: vec![Block::ZERO; dimension] }
-    }
-
-    /// Computes the differences and profiles of a query with a block of points.
+impl<S: Simd> Sums<S> {
+    /// Adds the contributions of the points of a block to the sums at x.
     #[inline(always)]
-    pub(super) fn fill<S: Simd, const ORDER: usize>(
+    pub(super) fn add<const ORDER: usize>(
         &mut self,
         simd: S,
-        nodes: &Nodes,
-        pairs: BlockPairs<'_>,
+        expansion: Expansion<'_>,
+        block: usize,
+        x: &[f64],
     ) {
-        let Self { profiles: [phi, slope, bend], differences } = self;
-        let differences = if ORDER == 0 { &mut [] } else { &mut differences[..] };
-        nodes.squared_distances(simd, pairs, phi, differences);
-        let (phi, kernel) = (phi.registers_mut::<S>(), pairs.kernel);
-        match ORDER {
-            0 => kernel.profiles(simd, [phi]),
-            1 => kernel.profiles(simd, [phi, slope.registers_mut::<S>()]),
-            _ => kernel.profiles(simd, [phi, slope.registers_mut::<S>(), bend.registers_mut::<S>()]),
-        }
+        let Expansion { nodes, kernel, weights } = expansion;
+        self.block.fill::<S, ORDER>(simd, nodes, BlockPairs { kernel, x, block });
+        self.add_block::<ORDER>(simd, &weights[block]);
     }
-}
 
-impl<S: Simd> Sums<S> {
     /// Adds the contributions of a block, whose differences and profiles are at hand.
     #[inline(always)]
     pub(super) fn add_block<const ORDER: usize>(&mut self, simd: S, weights: &Block) {
