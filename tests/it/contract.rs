@@ -25,7 +25,7 @@ pub use answer::{Received, decompressed};
 use document::{Contract, Operation, Response, Served};
 
 /// Paths outside the interface, with everything below them: pages for people, and the documents themselves.
-const BESIDE: [&str; 3] = ["/docs", "/openapi.json", "/openapi-3.0.json"];
+const BESIDE: [&str; 4] = ["/docs", "/openapi.json", "/openapi-3.0.json", "/page"];
 
 /// Headers that any answer may have: those of HTTP, compression, CORS and browser policies. All others must
 /// be declared. `gramian-cloud` is here because refusals repeat, for proxies, the cloud that a request named.
