@@ -4,22 +4,21 @@ use axum::extract::Path;
 use axum::http::HeaderMap;
 use axum::response::{Redirect, Response};
 
-use super::site::{INDEX, Site, files};
+use super::site::{File, INDEX, Site, files, packed};
 use crate::http::problem::Problem;
 
 /// What the pages may do. Swagger UI writes inline styles, and its style sheet contains icons.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; \
      font-src 'self' data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-static DOCUMENTATION: Site = Site::new(
-    files!["openapi/browser":
-        "index.html" HTML,
-        "initializer.js" SCRIPT,
-        "vendor/swagger-ui-bundle.js" SCRIPT,
-        "vendor/swagger-ui.css" STYLE,
-    ],
-    POLICY,
-);
+static FILES: &[File] = files!["openapi/browser":
+    "index.html" HTML,
+    "initializer.js" SCRIPT,
+    "vendor/swagger-ui-bundle.js" SCRIPT,
+    "vendor/swagger-ui.css" STYLE,
+];
+
+static DOCUMENTATION: Site = Site::new(POLICY, || packed(FILES));
 
 /// Leads to the folder, in which the links of its page are resolved.
 pub async fn get_documentation() -> Redirect {

@@ -1,6 +1,6 @@
 //! A folder of files for browsers. They are in the binary, and none loads anything from elsewhere.
 
-use std::sync::OnceLock;
+use std::sync::LazyLock;
 
 use axum::body::Bytes;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
@@ -42,20 +42,16 @@ pub const INDEX: &str = "index.html";
 
 /// A folder as it is served.
 pub struct Site {
-    pub files: &'static [File],
     /// Content security policy of all files.
     policy: &'static str,
     /// All files, compressed at the first request for any.
-    packed: OnceLock<Vec<Packed>>,
+    packed: LazyLock<Vec<Packed>>,
 }
 
 impl Site {
-    pub const fn new(files: &'static [File], policy: &'static str) -> Self {
-        Self { files, policy, packed: OnceLock::new() }
-    }
-
-    fn packed(&self) -> &[Packed] {
-        self.packed.get_or_init(|| self.files.iter().map(Packed::of).collect())
+    /// `pack` is to return [`packed`] files.
+    pub const fn new(policy: &'static str, pack: fn() -> Vec<Packed>) -> Self {
+        Self { policy, packed: LazyLock::new(pack) }
     }
 
     /// Answers a request for a file.
@@ -63,14 +59,19 @@ impl Site {
     /// # Errors
     /// Returns 404 if the folder has no such file.
     pub fn answer(&self, path: &str, headers: &HeaderMap) -> Result<Response, Problem> {
-        let packed = self.packed().iter().find(|packed| packed.file.path == path);
+        let packed = self.packed.iter().find(|packed| packed.file.path == path);
         let packed = packed.ok_or_else(|| Problem::new(Slug::NotFound, "the page has no such file"))?;
         Ok(packed.answer(headers, self.policy))
     }
 }
 
+/// Compresses files.
+pub fn packed(files: &'static [File]) -> Vec<Packed> {
+    files.iter().map(Packed::of).collect()
+}
+
 /// A file as it is sent.
-struct Packed {
+pub struct Packed {
     file: &'static File,
     /// Weak, since it stands for every coding.
     etag: String,
@@ -150,7 +151,8 @@ pub mod testing {
             let paths = files_in(&root).into_iter();
             let paths = paths.map(|path| path.strip_prefix(&root).unwrap().to_str().unwrap().to_owned());
             let mut found: Vec<String> = paths.filter(|path| !not_served.contains(&path.as_str())).collect();
-            let mut served: Vec<String> = self.files.iter().map(|file| file.path.to_owned()).collect();
+            let mut served: Vec<String> =
+                self.packed.iter().map(|packed| packed.file.path.to_owned()).collect();
             found.sort();
             served.sort();
             assert_eq!(found, served);
@@ -165,11 +167,11 @@ pub mod testing {
 
         /// Bytes of all files as browsers get them.
         pub fn n_compressed_bytes(&self) -> usize {
-            self.packed().iter().map(|packed| packed.gzip.len()).sum()
+            self.packed.iter().map(|packed| packed.gzip.len()).sum()
         }
 
         pub fn bytes(&self, path: &str) -> &'static [u8] {
-            self.files.iter().find(|file| file.path == path).unwrap().bytes
+            self.packed.iter().find(|packed| packed.file.path == path).unwrap().file.bytes
         }
 
         pub fn text(&self, path: &str) -> &'static str {

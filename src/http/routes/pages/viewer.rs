@@ -4,7 +4,7 @@ use axum::extract::Path;
 use axum::http::HeaderMap;
 use axum::response::Response;
 
-use super::site::{INDEX, Site, files};
+use super::site::{File, INDEX, Site, files, packed};
 use crate::http::openapi::responses::ProbeProblems;
 use crate::http::problem::Problem;
 
@@ -12,33 +12,32 @@ use crate::http::problem::Problem;
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; \
      connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-static PAGE: Site = Site::new(
-    files!["page":
-        "index.html" HTML,
-        "style.css" STYLE,
-        "icon.svg" PICTURE,
-        "main.js" SCRIPT,
-        "data/dragon.bin" NUMBERS,
-        "model/examples.js" SCRIPT,
-        "model/files.js" SCRIPT,
-        "model/operations.js" SCRIPT,
-        "model/section.js" SCRIPT,
-        "model/service.js" SCRIPT,
-        "model/snippets.js" SCRIPT,
-        "model/state.js" SCRIPT,
-        "model/tables.js" SCRIPT,
-        "model/tensors.js" SCRIPT,
-        "view/colours.js" SCRIPT,
-        "view/histogram.js" SCRIPT,
-        "view/material.js" SCRIPT,
-        "view/readout.js" SCRIPT,
-        "view/scene.js" SCRIPT,
-        "vendor/three/OrbitControls.js" SCRIPT,
-        "vendor/three/three.core.min.js" SCRIPT,
-        "vendor/three/three.module.min.js" SCRIPT,
-    ],
-    POLICY,
-);
+static FILES: &[File] = files!["page":
+    "index.html" HTML,
+    "style.css" STYLE,
+    "icon.svg" PICTURE,
+    "main.js" SCRIPT,
+    "data/dragon.bin" NUMBERS,
+    "model/examples.js" SCRIPT,
+    "model/files.js" SCRIPT,
+    "model/operations.js" SCRIPT,
+    "model/section.js" SCRIPT,
+    "model/service.js" SCRIPT,
+    "model/snippets.js" SCRIPT,
+    "model/state.js" SCRIPT,
+    "model/tables.js" SCRIPT,
+    "model/tensors.js" SCRIPT,
+    "view/colours.js" SCRIPT,
+    "view/histogram.js" SCRIPT,
+    "view/material.js" SCRIPT,
+    "view/readout.js" SCRIPT,
+    "view/scene.js" SCRIPT,
+    "vendor/three/OrbitControls.js" SCRIPT,
+    "vendor/three/three.core.min.js" SCRIPT,
+    "vendor/three/three.module.min.js" SCRIPT,
+];
+
+static PAGE: Site = Site::new(POLICY, || packed(FILES));
 
 /// See a cloud
 ///

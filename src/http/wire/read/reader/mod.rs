@@ -93,10 +93,12 @@ impl<'r, 'a> Value<'r, 'a> {
         }
         match token {
             Token::Object => return Ok(token),
-            Token::List if reader.are_numbers_in_tables && *list != List::Other => {
-                if reader.text.peek() != Some(b']') {
-                    return Err(Error::custom(BELONGS_IN_A_TENSOR));
-                }
+            Token::List
+                if reader.are_numbers_in_tables
+                    && *list != List::Other
+                    && reader.text.peek() != Some(b']') =>
+            {
+                return Err(Error::custom(BELONGS_IN_A_TENSOR));
             }
             _ => {}
         }

@@ -221,7 +221,7 @@ impl<'a> Text<'a> {
         let number = str::from_utf8(number).ok()?;
         let integer = match number.strip_prefix('-') {
             // Integers have no zero with a sign.
-            Some(digits) if digits == "0" => None,
+            Some("0") => None,
             Some(_) => number.parse().ok().map(Token::Signed),
             None => number.parse().ok().map(Token::Unsigned),
         };
