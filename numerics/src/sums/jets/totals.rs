@@ -86,7 +86,7 @@ impl<S: Simd> Sums<S> {
         self.hessian.fill(zero);
     }
 
-    /// Writes the sums up to an order, in the sequence that [`Layout::finish`] takes.
+    /// Writes the sums up to an order, in the sequence that [`finish`](super::Layout::finish) takes.
     #[inline(always)]
     pub(super) fn write<const ORDER: usize>(&self, numbers: &mut [f64]) {
         let d = self.gradient.len();
