@@ -12,11 +12,11 @@ use std::hint::black_box;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use gramian::http::wire::read::limits::ParseContext;
-use gramian::http::wire::read::parse::parse_json;
-use gramian::http::wire::read::points::Points;
-use gramian::http::wire::write::array::Array;
 use gramian::store::key::CloudId;
+use gramian_host::wire::read::limits::ParseContext;
+use gramian_host::wire::read::parse::parse_json;
+use gramian_host::wire::read::points::Points;
+use gramian_host::wire::write::array::Array;
 use gramian_numerics::function::posterior;
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::machine::instruction_set::InstructionSet;

@@ -1,8 +1,8 @@
 //! Geometric kernel interpolation and regression on point clouds, after Guidotti, served over HTTP.
 //!
-//! Layers, arrows pointing down: [`server`] → [`http`] → [`store`] → [`gramian_numerics`]. The last is a
-//! crate of its own and pure: f64 in, f64 out. Only `http` knows status codes and JSON. ARCHITECTURE.md has
-//! the map.
+//! The mathematics is `gramian_numerics`: f64 in, f64 out. What serves any computation of minutes over HTTP
+//! is `gramian_host`. This crate is what requests about clouds ask, and what they are answered.
+//! ARCHITECTURE.md has the map.
 
 // A request must never bring a thread down. Tests may.
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
@@ -13,11 +13,5 @@ pub mod store;
 pub mod http;
 
 pub mod config;
-pub mod features;
 pub mod files;
-mod machine;
 mod memory;
-mod process;
-pub mod server;
-pub mod signals;
-pub mod telemetry;

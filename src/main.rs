@@ -7,11 +7,12 @@ use clap::Parser;
 use futures_util::future::OptionFuture;
 use gramian::config::Config;
 use gramian::files::{self, FileCommand};
-use gramian::http::access;
+use gramian::http::router;
 use gramian::http::serve::durable;
 use gramian::http::state::app::App;
-use gramian::signals::{self, Signals};
-use gramian::{server, telemetry};
+use gramian_host::process::signals::{self, Signals};
+use gramian_host::process::telemetry;
+use gramian_host::{access, server};
 use tokio::net::TcpListener;
 use tokio::runtime::{Builder, Runtime};
 
@@ -55,11 +56,13 @@ fn main() -> ExitCode {
     server::install_provider();
     let Arguments { config, while_stdin, command } = Arguments::parse();
     let outcome = match command {
-        Some(Command::Health) => match server::is_ready(config.bind, config.tls_certificate.is_some()) {
-            Ok(true) => Ok(()),
-            Ok(false) => Err("not ready".into()),
-            Err(error) => Err(error.into()),
-        },
+        Some(Command::Health) => {
+            match server::is_ready(config.host.bind, config.host.tls_certificate.is_some()) {
+                Ok(true) => Ok(()),
+                Ok(false) => Err("not ready".into()),
+                Err(error) => Err(error.into()),
+            }
+        }
         Some(Command::File(command)) => return files::run(command, config),
         Some(Command::Key { name }) => make_key(&name).map_err(Into::into),
         None => {
@@ -102,15 +105,17 @@ async fn serve(config: Config, while_stdin: bool) -> Result<(), Box<dyn std::err
     {
         tracing::warn!(name, "there is no such setting");
     }
-    if config.is_exposed() && !config.allow_anonymous {
+    if config.host.is_exposed() && !config.host.allow_anonymous {
         let remedy =
             "set GRAMIAN_KEYS_FILE or GRAMIAN_API_KEYS, or GRAMIAN_ALLOW_ANONYMOUS=1 if that is meant";
-        return Err(format!("anyone who can reach {} could use the service: {remedy}", config.bind).into());
+        return Err(
+            format!("anyone who can reach {} could use the service: {remedy}", config.host.bind).into()
+        );
     }
-    let listener = TcpListener::bind(config.bind).await;
+    let listener = TcpListener::bind(config.host.bind).await;
     let listener =
-        listener.map_err(|error| format!("cannot listen on {} (GRAMIAN_BIND): {error}", config.bind))?;
-    if config.is_exposed() {
+        listener.map_err(|error| format!("cannot listen on {} (GRAMIAN_BIND): {error}", config.host.bind))?;
+    if config.host.is_exposed() {
         tracing::warn!("no keys are configured: anyone who can reach this address may use the service");
     }
     let mut signals = Signals::new()?;
@@ -128,10 +133,11 @@ async fn serve(config: Config, while_stdin: bool) -> Result<(), Box<dyn std::err
     };
     let app = App::new(config).await?;
     let (address, n_api_keys) = (listener.local_addr()?, app.keys.n_keys());
-    tracing::info!(%address, threads = app.config.n_threads(), n_api_keys, "listening");
+    tracing::info!(%address, threads = app.settings.n_threads(), n_api_keys, "listening");
     tokio::spawn(durable::catch_up(app.clone()));
     tokio::spawn(durable::retain(app.clone()));
     tokio::spawn(app.keys.clone().follow_file());
-    server::serve(app, listener, stop).await?;
+    let (router, runner) = router(app);
+    server::serve(runner, router, listener, stop).await?;
     Ok(())
 }

@@ -6,6 +6,7 @@
 //! allocator and the program itself have a part as well.
 
 use crate::config::Config;
+use gramian_host::state::host::Shares;
 
 /// Bytes that the process takes without any request: the program, and stacks and scratch space of two
 /// threads.
@@ -22,9 +23,6 @@ const INTAKE_SHARE: usize = 4;
 /// are in memory.
 const JOBS_SHARE: usize = 32;
 
-/// Bytes of numbers for each byte of a body: JSON has a number in two bytes, its comma included.
-pub const NUMBERS_PER_BODY: usize = 4;
-
 /// Divisor of the intake that gives the limit of one body. A body takes at most six times its limit: itself,
 /// its unpacked form, and four times that as numbers. One body may reserve seven eighths of the intake, which
 /// is seven times its limit.
@@ -37,52 +35,40 @@ const BODIES_PER_REQUEST_OF_MANY: usize = 14;
 /// Bytes of each part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Memory {
-    /// Bodies that are read and unpacked, and requests that wait.
-    pub intake: usize,
-    /// Jobs and their results, if there is no store.
-    pub jobs: usize,
+    /// Parts of the host. Factors and weights, cached or in use, are in that for work.
+    pub shares: Shares,
     /// Registered clouds.
     pub clouds: usize,
-    /// Factors and weights, cached or in use, all work with them, and answers.
-    pub work: usize,
     /// Cached factors and weights, a part of `work`.
     pub cache: usize,
     /// Reserve for the next factorization.
     pub spare: usize,
-    /// Limit of one body, and of its unpacked form.
-    pub body: usize,
 }
 
 impl Memory {
     /// Divides the budget. The settings for single parts are upper bounds.
     pub fn of(config: &Config) -> Self {
-        let total = config.memory_bytes();
-        let own = (OWN_BYTES + BYTES_PER_THREAD * config.n_threads()).min(total / 3);
+        let total = config.host.memory_bytes();
+        let own = (OWN_BYTES + BYTES_PER_THREAD * config.host.n_threads()).min(total / 3);
         let clouds = config.cloud_bytes.min(total / 8);
         let spare = (config.cache_bytes / 8).min(total / 16);
         let rest = total - own - clouds - spare;
         let intake = rest / INTAKE_SHARE;
-        let n_bodies = if config.n_owners() > 1 { BODIES_PER_REQUEST_OF_MANY } else { BODIES_PER_REQUEST };
-        let jobs = if config.store.is_none() { rest / JOBS_SHARE } else { 0 };
+        let n_bodies =
+            if config.host.n_owners() > 1 { BODIES_PER_REQUEST_OF_MANY } else { BODIES_PER_REQUEST };
+        let jobs = if config.host.store.is_none() { rest / JOBS_SHARE } else { 0 };
         let work = rest - intake - jobs;
-        let body = config.max_body_bytes.min(intake / n_bodies);
-        Self {
-            intake,
-            jobs,
-            clouds,
-            work,
-            cache: (config.cache_bytes - config.cache_bytes / 8).min(work),
-            spare,
-            body,
-        }
+        let body = config.host.max_body_bytes.min(intake / n_bodies);
+        let cache = (config.cache_bytes - config.cache_bytes / 8).min(work);
+        Self { shares: Shares { intake, body, jobs, work }, clouds, cache, spare }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::machine::LEAST_BYTES;
-    use crate::store::budget::Budget;
+    use gramian_host::memory::budget::Budget;
+    use gramian_host::process::machine::LEAST_BYTES;
 
     fn config(flags: &[&str]) -> Config {
         #[derive(clap::Parser)]
@@ -103,17 +89,24 @@ mod tests {
                     let config =
                         config(&[&["--memory-bytes", &bytes_text, "--threads", threads][..], keys].concat());
                     let memory = Memory::of(&config);
-                    let sum = memory.intake + memory.jobs + memory.clouds + memory.work + memory.spare;
+                    let sum = memory.shares.intake
+                        + memory.shares.jobs
+                        + memory.clouds
+                        + memory.shares.work
+                        + memory.spare;
                     assert!(sum < bytes && sum > bytes / 2, "{bytes} {threads}: {memory:?}");
-                    let largest = Budget::new(memory.intake, n_owners).largest();
-                    assert!(memory.cache <= memory.work && 6 * memory.body <= largest, "{memory:?}");
+                    let largest = Budget::new(memory.shares.intake, n_owners).largest();
+                    assert!(
+                        memory.cache <= memory.shares.work && 6 * memory.shares.body <= largest,
+                        "{memory:?}"
+                    );
                 }
             }
         }
         // With enough memory, each part is as large as its setting.
         let memory = Memory::of(&config(&["--memory-bytes", "68719476736", "--threads", "2"]));
         assert_eq!(
-            (memory.clouds, memory.body, memory.cache + memory.spare),
+            (memory.clouds, memory.shares.body, memory.cache + memory.spare),
             (512 << 20, 256 << 20, 4 << 30)
         );
     }
@@ -129,7 +122,7 @@ mod tests {
             let config = config(&[&flags[..], keys].concat());
             let memory = Memory::of(&config);
             assert!(
-                config.max_points >= N && config.max_queries >= N && memory.body >= JSON_BYTES,
+                config.max_points >= N && config.max_queries >= N && memory.shares.body >= JSON_BYTES,
                 "{memory:?}"
             );
             // Points, normals and data on their neighbours.
@@ -137,7 +130,7 @@ mod tests {
             // Curvatures with deviations: 20 numbers per point as text, and twice as numbers while they are
             // assembled.
             assert!(config.max_response_bytes >= 2 * N * 20 * 25);
-            assert!(Budget::new(memory.work, n_owners).largest() >= 2 * N * 20 * 8);
+            assert!(Budget::new(memory.shares.work, n_owners).largest() >= 2 * N * 20 * 8);
         }
     }
 }

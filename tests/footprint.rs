@@ -9,10 +9,10 @@ mod common;
 use std::sync::Arc;
 use std::time::Duration;
 
-use gramian::store::Owner;
 use gramian::store::clouds::CloudStore;
 use gramian::store::key::{CloudId, FitKey, ValuesKey};
 use gramian::store::prepared::{PreparedBytes, PreparedFit, PreparedStore};
+use gramian_host::memory::Owner;
 use gramian_numerics::error::NumericsError;
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::{Family, Kernel};

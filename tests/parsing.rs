@@ -13,11 +13,11 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use gramian::http::problem::Problem;
-use gramian::http::wire::negotiation::{BodyFormat, Coding};
-use gramian::http::wire::read::body::RequestBody;
-use gramian::http::wire::read::limits::ParseContext;
-use gramian::http::wire::read::members::present_unless_empty;
-use gramian::http::wire::read::points::Points;
+use gramian_host::wire::negotiation::{BodyFormat, Coding};
+use gramian_host::wire::read::body::RequestBody;
+use gramian_host::wire::read::limits::ParseContext;
+use gramian_host::wire::read::members::present_unless_empty;
+use gramian_host::wire::read::points::Points;
 use gramian_numerics::observer::Unobserved;
 use peak_alloc::PeakAlloc;
 use proptest::prelude::*;

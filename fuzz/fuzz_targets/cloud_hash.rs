@@ -4,7 +4,7 @@
 #![no_main]
 
 use gramian_numerics::points::cloud::Cloud;
-use gramian::store::Owner;
+use gramian_host::memory::Owner;
 use gramian::store::clouds::CloudStore;
 use gramian::store::key::CloudId;
 use gramian::store::objects::cloud_object::{decode, encode};

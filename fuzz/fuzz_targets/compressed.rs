@@ -3,7 +3,7 @@
 #![no_main]
 
 use gramian::http::reading::read_cloud;
-use gramian::http::wire::negotiation::{BodyFormat, Coding};
+use gramian_host::wire::negotiation::{BodyFormat, Coding};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {

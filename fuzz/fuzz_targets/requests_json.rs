@@ -4,7 +4,7 @@
 #![no_main]
 
 use gramian::http::reading::{OPERATIONS, read_as};
-use gramian::http::wire::negotiation::{BodyFormat, Coding};
+use gramian_host::wire::negotiation::{BodyFormat, Coding};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {

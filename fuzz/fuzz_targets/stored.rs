@@ -9,7 +9,7 @@ use futures_util::StreamExt;
 use gramian::store::key::CloudId;
 use gramian::store::objects::{Objects, OwnerName};
 use gramian::store::objects::cloud_object::{decode, encode};
-use gramian::store::objects::jobs::JobId;
+use gramian_host::store::jobs::JobId;
 use libfuzzer_sys::fuzz_target;
 use object_store::memory::InMemory;
 use object_store::path::Path;

@@ -3,10 +3,10 @@
 #![no_main]
 
 use gramian::config::Origins;
-use gramian::http::access::check_file;
+use gramian_host::access::check_file;
 use gramian::store::key::CloudId;
 use gramian::store::objects::Place;
-use gramian::store::objects::jobs::JobId;
+use gramian_host::store::jobs::JobId;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|text: &str| {

@@ -1,5 +1,7 @@
 //! The error type of the numerical layer, with its messages.
 
+use gramian_observer::Cancelled;
+
 /// The result of a computation that may be refused.
 pub type Result<T, E = NumericsError> = std::result::Result<T, E>;
 
@@ -86,6 +88,12 @@ pub enum NumericsError {
     NotConverged { relative_residual: f64, tolerance: f64 },
     #[error("the computation was cancelled")]
     Cancelled,
+}
+
+impl From<Cancelled> for NumericsError {
+    fn from(_: Cancelled) -> Self {
+        Self::Cancelled
+    }
 }
 
 /// The reason why a system has no trustworthy answer without more regularization.

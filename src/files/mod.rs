@@ -13,7 +13,7 @@ use axum::body::Bytes;
 use serde_json::{Map, Value, json};
 
 use crate::config::Config;
-use crate::signals::Signals;
+use gramian_host::process::signals::Signals;
 use output::Output;
 use router::{Answerer, Failure};
 

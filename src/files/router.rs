@@ -16,6 +16,7 @@ use super::progress::Progress;
 use crate::config::Config;
 use crate::http;
 use crate::http::state::app::App;
+use gramian_host::state::settings::Settings;
 
 /// Time between two looks at a computation.
 const LOOKING: Duration = Duration::from_millis(100);
@@ -69,7 +70,8 @@ pub struct Answerer {
 impl Answerer {
     /// Starts it, without keys and without a store: nobody else can ask, and nothing is kept.
     pub async fn start(config: Config) -> Result<Self, Failure> {
-        let config = Config { api_keys: Vec::new(), keys_file: None, store: None, ..config };
+        let host = Settings { api_keys: Vec::new(), keys_file: None, store: None, ..config.host };
+        let config = Config { host, ..config };
         let app = App::new(config).await;
         let app = app.map_err(|error| Failure::File(format!("the service does not start: {error}")))?;
         let (router, _) = http::router(app);

@@ -1,17 +1,11 @@
 //! HTTP interface of the service. This page lists every route and the order of middleware.
 
-pub mod access;
-pub mod around;
-pub mod compute;
 pub mod fields;
-pub mod jobs;
-pub mod metrics;
 pub mod openapi;
 pub mod problem;
 mod routes;
 pub mod serve;
 pub mod state;
-pub mod wire;
 
 use std::sync::Arc;
 
@@ -26,9 +20,9 @@ use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use crate::config::Origins;
-use around::{authentication, middleware};
-use jobs::Runner;
+use gramian_host::around::{authentication, middleware};
+use gramian_host::jobs::{self, Runner};
+use gramian_host::state::settings::Origins;
 use openapi::version_3_0;
 use routes::pages::{documentation, viewer};
 pub use routes::reading;
@@ -42,14 +36,15 @@ use state::app::App;
 pub fn router(app: Arc<App>) -> (Router, Runner) {
     let (v1, probes, document) = parts();
     let recover = || CatchPanicLayer::custom(middleware::recover as fn(_) -> _);
-    let runner = Runner { app: app.clone(), routes: v1.clone().layer(recover()).with_state(app.clone()) };
+    let runner =
+        Runner { host: app.host.clone(), routes: v1.clone().layer(recover()).with_state(app.clone()) };
     let document = openapi::to_value(&document);
     let document_3_1 = serve_json(openapi::to_text(&document).into());
     let document_3_0 = serve_json(openapi::to_text(&version_3_0::derive(document)).into());
     let v1 = v1
-        .layer(from_fn_with_state(app.clone(), middleware::meet_deadline))
+        .layer(from_fn_with_state(app.host.clone(), middleware::meet_deadline))
         .layer(from_fn_with_state(runner.clone(), jobs::respond_async))
-        .layer(from_fn_with_state(app.clone(), authentication::authenticate));
+        .layer(from_fn_with_state(app.host.clone(), authentication::authenticate));
     let router = v1
         .merge(probes)
         .route("/page/{*path}", get(viewer::get_page_file))
@@ -61,8 +56,8 @@ pub fn router(app: Arc<App>) -> (Router, Runner) {
         .fallback(middleware::not_found)
         .method_not_allowed_fallback(middleware::method_not_allowed)
         .layer(recover())
-        .layer(option_layer(app.config.cors_origins.as_ref().map(cors)))
-        .layer(from_fn_with_state(app.clone(), middleware::name_and_log))
+        .layer(option_layer(app.settings.cors_origins.as_ref().map(cors)))
+        .layer(from_fn_with_state(app.host.clone(), middleware::name_and_log))
         .with_state(app);
     (router, runner)
 }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::Owner;
+use gramian_host::memory::Owner;
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::model::Recipe;

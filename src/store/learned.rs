@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::Owner;
-use super::fair_cache::FairCache;
 use super::key::{CloudId, ValuesKey};
-use super::single_flight::SingleFlight;
+use gramian_host::memory::Owner;
+use gramian_host::memory::fair_cache::FairCache;
+use gramian_host::memory::single_flight::SingleFlight;
 use gramian_numerics::machine::heap::{arc_payload, block_bytes};
 use gramian_numerics::selection::Learned;
 

@@ -4,11 +4,12 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
-use super::Owner;
-use super::budget::{BeyondBudget, Budget, Reservation, Shortage};
-use super::fair_cache::{Counts, FairCache};
 use super::key::{CloudId, FitKey, ValuesKey};
-use super::single_flight::{Boarding, SingleFlight};
+use gramian_host::compute::StageTimes;
+use gramian_host::memory::budget::{BeyondBudget, Budget, Reservation, Shortage};
+use gramian_host::memory::fair_cache::{Counts, FairCache};
+use gramian_host::memory::single_flight::{Boarding, SingleFlight};
+use gramian_host::memory::{CacheOutcome, Owner};
 use gramian_numerics::machine::heap::{arc_payload, block_bytes};
 use gramian_numerics::machine::pages::SpareBuffer;
 use gramian_numerics::model::Model;
@@ -72,6 +73,11 @@ impl PreparedFit {
         &self.model
     }
 
+    /// Times of the stages in which the model was made.
+    pub fn times(&self) -> StageTimes {
+        StageTimes { gram: self.gram_time, factor: self.factor_time, ..StageTimes::default() }
+    }
+
     /// The label of the model in metrics.
     pub fn kind(&self) -> &'static str {
         if self.is_restored { "restored" } else { self.model.name() }
@@ -94,18 +100,6 @@ impl PreparedFit {
     }
 }
 
-/// Origin of a model, in the terms of RFC 9211.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum CacheOutcome {
-    Hit,
-    /// Computed for another request at the same time.
-    Collapsed,
-    /// Computed for this request and cached.
-    Stored,
-    /// Computed for this request, but larger than the whole cache.
-    NotStored,
-}
-
 /// Byte limits of a [`PreparedStore`].
 #[derive(Debug, Clone, Copy)]
 pub struct PreparedBytes {
@@ -113,10 +107,6 @@ pub struct PreparedBytes {
     pub kept: usize,
     /// Largest size of the buffer that is kept for the next factorization, besides the budget.
     pub spare: usize,
-    /// Largest size of everything that is made here, cached or in use.
-    pub budget: usize,
-    /// Number of owners who share the budget.
-    pub n_owners: usize,
 }
 
 /// Cache of models, surfaces and weights within one byte budget. The budget includes the work done with them.
@@ -137,14 +127,15 @@ struct KeptSolution {
 }
 
 impl<E: Clone + Send + Sync + 'static> PreparedStore<E> {
-    pub fn new(bytes: PreparedBytes) -> Self {
+    /// Creates an empty cache. What it keeps is reserved from `budget`, like the work done with it.
+    pub fn new(bytes: PreparedBytes, budget: Budget) -> Self {
         let solutions = bytes.kept / WEIGHTS_SHARE;
         Self {
             fits: Arc::new(FairCache::new(bytes.kept - solutions)),
             solutions: FairCache::new(solutions),
             flights: SingleFlight::new(),
             surfaces: SingleFlight::new(),
-            budget: Budget::new(bytes.budget, bytes.n_owners),
+            budget,
             spare: SpareBuffer::up_to(bytes.spare),
         }
     }

@@ -18,7 +18,7 @@ mod tests;
 
 use std::sync::LazyLock;
 
-use gramian::http::problem::slug::Slug;
+use crate::http::problem::catalogue;
 use serde_json::{Value, json};
 
 pub use answer::{Received, decompressed};

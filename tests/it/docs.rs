@@ -10,9 +10,9 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::http::problem::catalogue;
 use clap::Args;
 use gramian::config::Config;
-use gramian::http::problem::slug::Slug;
 use serde_json::Value;
 
 use crate::support::overwrites;

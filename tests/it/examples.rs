@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::http::problem::catalogue;
 use gramian::http::openapi::examples::{EXAMPLES, PROBLEMS};
 use gramian::http::problem::Problem;
-use gramian::http::problem::slug::Slug;
 use serde_json::{Map, Value, json};
 
 use crate::limits::slow_request;
@@ -122,15 +122,15 @@ fn every_operation_with_a_body_has_an_example() {
 /// Returns the problem that a request provokes. Three of them cannot be provoked by a single request.
 async fn provoked(slug: Slug, sample: &Value) -> Value {
     match slug {
-        Slug::Internal => return document(&Problem::internal()),
-        Slug::RateLimited => return document(&Problem::rate_limited("600 requests a minute", 1)),
-        Slug::Overloaded => return document(&Problem::overloaded(1)),
-        Slug::DeadlineExceeded => {
+        catalogue::INTERNAL => return document(&Problem::internal()),
+        catalogue::RATE_LIMITED => return document(&Problem::rate_limited("600 requests a minute", 1)),
+        catalogue::OVERLOADED => return document(&Problem::overloaded(1)),
+        catalogue::DEADLINE_EXCEEDED => {
             let server = Server::with_flags(&["--deadline-seconds", "0.05"]).await;
             let request = server.client.post(server.url("/v1/normals")).json(&slow_request());
             return server.send(request.header("x-request-id", REQUEST_ID)).await.json();
         }
-        Slug::RequestTimeout => {
+        catalogue::REQUEST_TIMEOUT => {
             let server = Server::with_flags(&["--body-seconds", "0.1"]).await;
             let head = format!("X-Request-Id: {REQUEST_ID}\r\nContent-Length: 100000");
             return server.post_stalled("/v1/normals", &head, "{\"cloud\": ").await.json().unwrap();

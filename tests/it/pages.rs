@@ -1,6 +1,6 @@
 //! Pages for people (root, problems, docs), probes and the version.
 
-use gramian::http::problem::slug::Slug;
+use crate::http::problem::catalogue;
 use serde_json::{Value, json};
 
 use crate::routes::ROUTES;

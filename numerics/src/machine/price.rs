@@ -4,24 +4,7 @@
 //! longer for each operation, so its flops count for more. Each module keeps the prices of its computations
 //! in a file `price.rs`, or beside the function.
 
-/// Bytes and flops of a computation; `usize::MAX` bytes where they cannot be counted.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Price {
-    pub n_bytes: usize,
-    pub flops: f64,
-}
-
-impl Price {
-    /// The price of `n_numbers` numbers in float64, and of flops.
-    pub fn of_numbers(n_numbers: usize, flops: f64) -> Self {
-        Self { n_bytes: n_numbers.saturating_mul(size_of::<f64>()), flops }
-    }
-
-    /// The sum of two prices.
-    pub fn and(self, other: Self) -> Self {
-        Self { n_bytes: self.n_bytes.saturating_add(other.n_bytes), flops: self.flops + other.flops }
-    }
-}
+pub use gramian_observer::Price;
 
 /// Sizes of a cloud and of the queries over it.
 #[derive(Debug, Clone, Copy)]

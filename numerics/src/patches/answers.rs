@@ -9,7 +9,7 @@ use super::neighbourhood::Neighbourhood;
 use super::pooled::Weighted;
 use super::regression::{Kriged, n_terms};
 use super::room::{Purpose, Room};
-use crate::error::Result;
+use crate::error::{NumericsError, Result};
 use crate::machine::instruction_set::InstructionSet;
 use crate::machine::lanes::MAX_LANES;
 use crate::machine::small::{Small, zeros};
@@ -192,7 +192,7 @@ impl Patches {
                         slots.put(lane, place, estimate, d, are_points);
                     }
                 }
-                Ok(())
+                Ok::<_, NumericsError>(())
             },
         )?;
         Ok(geometry)

@@ -6,7 +6,7 @@ use super::cloud::Cloud;
 use super::neighbourhoods::Neighbourhoods;
 use super::patch::Patch;
 use super::quadric::Quadric;
-use crate::error::Result;
+use crate::error::{NumericsError, Result};
 use crate::machine::eigen::symmetric_eigen;
 use crate::machine::heap::vec_bytes;
 use crate::machine::small::Small;
@@ -110,7 +110,7 @@ impl LocalQuadrics {
             observer.checkpoint()?;
             let nearest = neighbourhoods.around(query);
             *found = fit(cloud, queries.point(query), nearest, row).unwrap_or(Found::Nothing);
-            Ok(())
+            Ok::<_, NumericsError>(())
         })?;
         Ok(Self { dimension: d, rows, found })
     }

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::cloud::Cloud;
 use super::neighbours::{Neighbour, Neighbours, Walk};
-use crate::error::Result;
+use crate::error::{NumericsError, Result};
 use crate::observer::Observer;
 
 /// The nearest positions of a cloud around each of m queries, nearest first.
@@ -39,7 +39,7 @@ impl Neighbourhoods {
                 walk.points_into(queries.point(query), count, found);
                 row.iter_mut().zip(found.iter()).for_each(|(slot, found)| *slot = found.point as u32);
                 *nearest = found[0].squared_distance;
-                Ok(())
+                Ok::<_, NumericsError>(())
             },
         )?;
         Ok(Self { count, points, nearest })

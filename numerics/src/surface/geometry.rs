@@ -7,7 +7,7 @@ use super::curvature::{principal_curvatures, tangential_trace};
 use super::degeneracy::{Degeneracy, DegeneracyReason, Resolution, is_far};
 pub use super::request::{GeometryRequest, Orientation, SurfaceModel};
 use super::served::{Deviations, Served, ServedBy};
-use crate::error::Result;
+use crate::error::{NumericsError, Result};
 use crate::machine::vector::norm;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
@@ -200,7 +200,7 @@ impl Geometry {
                 directions.copy_from_slice(&vectors);
                 *mean = values.iter().sum::<f64>() / k as f64;
                 *gaussian = values.iter().product();
-                Ok(())
+                Ok::<_, NumericsError>(())
             })?;
         Ok(curvatures)
     }

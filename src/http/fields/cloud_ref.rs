@@ -6,9 +6,9 @@ use serde::Deserialize;
 use utoipa::ToSchema;
 
 use super::schemas::CloudIdSchema;
-use crate::http::wire::read::members::present_unless_empty;
-use crate::http::wire::read::points::Points;
 use crate::store::clouds::RegisteredCloud;
+use gramian_host::wire::read::members::present_unless_empty;
+use gramian_host::wire::read::points::Points;
 
 /// A cloud, given by the id of a registered cloud or by its points. Exactly one of `id` and `points` is
 /// given.

@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 use super::hyperparameters::Hyperparameters;
 use super::kernel::KernelUsed;
 use super::schemas::CloudIdSchema;
-use crate::http::wire::write::answer::json_members;
+use gramian_host::json_members;
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::solver::{Disagreement, Outlier, Place};
 use gramian_numerics::surface::operators::{RowKind, Stencils};

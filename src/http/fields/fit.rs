@@ -7,8 +7,8 @@ use super::choices::{DuplicatePolicy, MeanChoice, SolverChoice, SurfaceChoice};
 use super::cloud_ref::CloudRef;
 use super::hyperparameters::Hyperparameters;
 use super::kernel::Kernel;
-use crate::http::wire::read::members::present_unless_empty;
-use crate::http::wire::read::points::Points;
+use gramian_host::wire::read::members::present_unless_empty;
+use gramian_host::wire::read::points::Points;
 
 /// The surface of an operator, if it differs from the surface of the request.
 ///
@@ -108,7 +108,7 @@ macro_rules! request {
             #[schema(minimum = 0.0)]
             pub alpha: Option<f64>,
             /// The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
-            #[serde(default, deserialize_with = "crate::http::wire::read::members::present_unless_empty")]
+            #[serde(default, deserialize_with = "gramian_host::wire::read::members::present_unless_empty")]
             pub noise_variances: Option<Vec<f64>>,
             /// The method that solves the linear system.
             pub solver: Option<$crate::http::fields::SolverChoice>,

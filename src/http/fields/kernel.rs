@@ -4,9 +4,9 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::schemas::Smoothness;
-use crate::http::problem::{Pointers, Problem};
-use crate::http::wire::read::members::present_unless_empty;
-use crate::http::wire::write::answer::json_members;
+use crate::http::problem::{Pointers, Problem, from_numerics};
+use gramian_host::json_members;
+use gramian_host::wire::read::members::present_unless_empty;
 use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::kernel::{Family, Kernel as NumericalKernel, WendlandSmoothness};
 use gramian_numerics::patches::PatchKernel;
@@ -126,7 +126,7 @@ impl PlannedKernel {
                     }
                 };
                 NumericalKernel::new(family, length_scale, variance)
-                    .map_err(|error| Problem::from_numerics(error, pointers))
+                    .map_err(|error| from_numerics(error, pointers))
             }
         }
     }
@@ -149,7 +149,7 @@ impl Kernel {
             // Without a length scale, an arbitrary one serves to check the other parameters.
             (length_scale, None) => NumericalKernel::new(family, length_scale.unwrap_or(1.0), variance),
         };
-        let kernel = kernel.map_err(|error| Problem::from_numerics(error, pointers))?;
+        let kernel = kernel.map_err(|error| from_numerics(error, pointers))?;
         Ok(match (self.length_scale, &self.length_scales) {
             (None, None) => PlannedKernel::OfCloud { family, variance },
             _ => PlannedKernel::Given(kernel),

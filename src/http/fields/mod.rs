@@ -7,6 +7,7 @@ mod cloud_ref;
 mod diagnostics;
 mod fit;
 mod hyperparameters;
+pub mod limits;
 pub mod schemas;
 
 pub use choices::{

@@ -10,7 +10,8 @@ use utoipa::openapi::path::Operation;
 use utoipa::openapi::{Content, Ref, RefOr};
 
 use super::{id_of, operations};
-use crate::http::problem::slug::Slug;
+use crate::http::problem;
+use gramian_host::problem::slug::Slug;
 
 /// The name and text of an example file.
 macro_rules! example_file {
@@ -115,7 +116,7 @@ fn set_example(content: Option<&mut RefOr<Content>>, example: Option<&Value>) {
 fn problem_examples() -> BTreeMap<String, RefOr<Example>> {
     let samples: BTreeMap<String, Sample> = serde_json::from_str(PROBLEMS).unwrap_or_default();
     let example = |(slug, sample): (String, Sample)| {
-        let title = Slug::parse(&slug)?.title();
+        let title = problem::named(&slug)?.title();
         let example = ExampleBuilder::new().summary(title).value(Some(sample.response)).build();
         Some((slug, RefOr::T(example)))
     };

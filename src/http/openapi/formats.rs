@@ -4,7 +4,7 @@ use utoipa::openapi::schema::{KnownFormat, SchemaFormat, SchemaType, Type};
 use utoipa::openapi::{Content, ContentBuilder, ObjectBuilder, RefOr};
 
 use super::{id_of, is_direct, operations};
-use crate::http::wire::negotiation::{BodyFormat, Format};
+use gramian_host::wire::negotiation::{BodyFormat, Format};
 
 /// Returns the media types other than JSON that an operation accepts and answers with.
 fn binary_formats(operation_id: &str) -> (&'static [BodyFormat], &'static [Format]) {

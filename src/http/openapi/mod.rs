@@ -17,7 +17,7 @@ use utoipa::openapi::path::{Operation, PathItem};
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme};
 use utoipa::{Modify, OpenApi};
 
-use super::problem::ProblemDocument;
+use gramian_host::problem::ProblemDocument;
 
 /// The parts of the document that no operation declares.
 #[derive(OpenApi)]

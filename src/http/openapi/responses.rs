@@ -11,7 +11,8 @@ use utoipa::IntoResponses;
 use utoipa::openapi::{ContentBuilder, Ref, RefOr, Response, ResponseBuilder};
 
 use super::examples::problem_example;
-use crate::http::problem::slug::Slug;
+use crate::http::problem::catalogue;
+use gramian_host::problem::slug::Slug;
 
 /// Declares a set of problems.
 macro_rules! problem_set {
@@ -21,7 +22,7 @@ macro_rules! problem_set {
 
         impl IntoResponses for $name {
             fn responses() -> BTreeMap<String, RefOr<Response>> {
-                responses_of(&[$(Slug::$slug),*])
+                responses_of(&[$(catalogue::$slug),*])
             }
         }
     };
@@ -30,73 +31,73 @@ macro_rules! problem_set {
 problem_set! {
     /// Problems of operations that compute.
     ComputeProblems:
-    MalformedRequest, MalformedJson, MalformedBody, Unauthorized, RateLimited, UnknownCloud, NotAcceptable, RequestTimeout, BodyTooLarge,
-    ProblemTooLarge,
-    UnsupportedMediaType, InvalidRequest, InvalidCloud, DuplicatePoints, DimensionMismatch, LengthMismatch,
-    KernelNotSmooth, KernelNotPositiveDefinite, NotPositiveDefinite, NotConverged, UnsupportedBySolver, Internal, Overloaded,
-    DeadlineExceeded
+    MALFORMED_REQUEST, MALFORMED_JSON, MALFORMED_BODY, UNAUTHORIZED, RATE_LIMITED, UNKNOWN_CLOUD, NOT_ACCEPTABLE, REQUEST_TIMEOUT, BODY_TOO_LARGE,
+    PROBLEM_TOO_LARGE,
+    UNSUPPORTED_MEDIA_TYPE, INVALID_REQUEST, INVALID_CLOUD, DUPLICATE_POINTS, DIMENSION_MISMATCH, LENGTH_MISMATCH,
+    KERNEL_NOT_SMOOTH, KERNEL_NOT_POSITIVE_DEFINITE, NOT_POSITIVE_DEFINITE, NOT_CONVERGED, UNSUPPORTED_BY_SOLVER, INTERNAL, OVERLOADED,
+    DEADLINE_EXCEEDED
 }
 
 problem_set! {
     /// Problems of the registration of a cloud.
     RegisterProblems:
-    MalformedRequest, MalformedJson, MalformedBody, Unauthorized, RateLimited, NotAcceptable, RequestTimeout, BodyTooLarge, ProblemTooLarge,
-    UnsupportedMediaType,
-    InvalidRequest, InvalidCloud, DimensionMismatch, LengthMismatch, Internal, Overloaded, DeadlineExceeded
+    MALFORMED_REQUEST, MALFORMED_JSON, MALFORMED_BODY, UNAUTHORIZED, RATE_LIMITED, NOT_ACCEPTABLE, REQUEST_TIMEOUT, BODY_TOO_LARGE, PROBLEM_TOO_LARGE,
+    UNSUPPORTED_MEDIA_TYPE,
+    INVALID_REQUEST, INVALID_CLOUD, DIMENSION_MISMATCH, LENGTH_MISMATCH, INTERNAL, OVERLOADED, DEADLINE_EXCEEDED
 }
 
 problem_set! {
     /// Problems of the description of a cloud. A path that is not UTF-8 is not found.
-    DescribeProblems: MalformedRequest, Unauthorized, RateLimited, UnknownCloud, NotFound, NotAcceptable, Internal, Overloaded, DeadlineExceeded
+    DescribeProblems: MALFORMED_REQUEST, UNAUTHORIZED, RATE_LIMITED, UNKNOWN_CLOUD, NOT_FOUND, NOT_ACCEPTABLE, INTERNAL, OVERLOADED, DEADLINE_EXCEEDED
 }
 
 problem_set! {
     /// Problems of operations that only look a cloud up and answer without a body.
-    LookUpProblems: MalformedRequest, Unauthorized, RateLimited, UnknownCloud, NotFound, Internal, Overloaded
+    LookUpProblems: MALFORMED_REQUEST, UNAUTHORIZED, RATE_LIMITED, UNKNOWN_CLOUD, NOT_FOUND, INTERNAL, OVERLOADED
 }
 
 problem_set! {
     /// Problems of operations that describe a job.
-    JobProblems: MalformedRequest, Unauthorized, RateLimited, UnknownJob, NotFound, NotAcceptable, Internal, Overloaded, DeadlineExceeded
+    JobProblems: MALFORMED_REQUEST, UNAUTHORIZED, RATE_LIMITED, UNKNOWN_JOB, NOT_FOUND, NOT_ACCEPTABLE, INTERNAL, OVERLOADED, DEADLINE_EXCEEDED
 }
 
 problem_set! {
     /// Problems of operations on a job that need no media type in common.
-    AnyJobProblems: MalformedRequest, Unauthorized, RateLimited, UnknownJob, NotFound, Internal, Overloaded
+    AnyJobProblems: MALFORMED_REQUEST, UNAUTHORIZED, RATE_LIMITED, UNKNOWN_JOB, NOT_FOUND, INTERNAL, OVERLOADED
 }
 
 problem_set! {
     /// Problems of fetching the result of a job, which include those of the request that became the job.
     JobResultProblems:
-    MalformedRequest, MalformedJson, MalformedBody, Unauthorized, RateLimited, UnknownCloud, UnknownJob, NotFound, NotAcceptable,
-    BodyTooLarge, ProblemTooLarge, UnsupportedMediaType, InvalidRequest, InvalidCloud, DuplicatePoints, DimensionMismatch,
-    LengthMismatch, KernelNotSmooth, KernelNotPositiveDefinite, NotPositiveDefinite, NotConverged, UnsupportedBySolver, Internal, Overloaded,
-    DeadlineExceeded
+    MALFORMED_REQUEST, MALFORMED_JSON, MALFORMED_BODY, UNAUTHORIZED, RATE_LIMITED, UNKNOWN_CLOUD, UNKNOWN_JOB, NOT_FOUND, NOT_ACCEPTABLE,
+    BODY_TOO_LARGE, PROBLEM_TOO_LARGE, UNSUPPORTED_MEDIA_TYPE, INVALID_REQUEST, INVALID_CLOUD, DUPLICATE_POINTS, DIMENSION_MISMATCH,
+    LENGTH_MISMATCH, KERNEL_NOT_SMOOTH, KERNEL_NOT_POSITIVE_DEFINITE, NOT_POSITIVE_DEFINITE, NOT_CONVERGED, UNSUPPORTED_BY_SOLVER, INTERNAL, OVERLOADED,
+    DEADLINE_EXCEEDED
 }
 
 problem_set! {
     /// Problems of the list of clouds.
-    ListProblems: MalformedRequest, Unauthorized, RateLimited, NotAcceptable, InvalidRequest, Internal, Overloaded, DeadlineExceeded
+    ListProblems: MALFORMED_REQUEST, UNAUTHORIZED, RATE_LIMITED, NOT_ACCEPTABLE, INVALID_REQUEST, INTERNAL, OVERLOADED, DEADLINE_EXCEEDED
 }
 
 problem_set! {
     /// Problems of operations that only read built-in information.
-    ReadProblems: MalformedRequest, Unauthorized, RateLimited, NotAcceptable, Internal, Overloaded
+    ReadProblems: MALFORMED_REQUEST, UNAUTHORIZED, RATE_LIMITED, NOT_ACCEPTABLE, INTERNAL, OVERLOADED
 }
 
 problem_set! {
     /// Problems of probes and pages, which are only refused with their connection or its head.
-    ProbeProblems: MalformedRequest, Internal, Overloaded
+    ProbeProblems: MALFORMED_REQUEST, INTERNAL, OVERLOADED
 }
 
 problem_set! {
     /// Problems of the readiness probe.
-    ReadyProblems: MalformedRequest, Internal, Overloaded
+    ReadyProblems: MALFORMED_REQUEST, INTERNAL, OVERLOADED
 }
 
 problem_set! {
     /// Problems of the page of a problem type.
-    PageProblems: MalformedRequest, NotFound, Internal, Overloaded
+    PageProblems: MALFORMED_REQUEST, NOT_FOUND, INTERNAL, OVERLOADED
 }
 
 /// Returns a response for each status, with its problems and an example of each.

@@ -12,27 +12,27 @@ use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::http::around::middleware::CLOUD_HEADER;
-use crate::http::compute::{Admission, JobObserver, Work};
 use crate::http::fields::schemas::{CloudIdSchema, CursorSchema};
 use crate::http::openapi::responses::{DescribeProblems, ListProblems, LookUpProblems, RegisterProblems};
 use crate::http::problem::Problem;
 use crate::http::serve::durable::{find_cloud, forget_cloud, keep, list_clouds as list_of};
-use crate::http::serve::intake::read_body;
 use crate::http::serve::planner::{Planner, unknown_cloud};
 use crate::http::serve::sampling::find_sampling;
 use crate::http::state::app::App;
-use crate::http::wire::etag::is_known;
-use crate::http::wire::negotiation::BodyFormat;
-use crate::http::wire::read::members::present_unless_empty;
-use crate::http::wire::read::points::Points;
-use crate::http::wire::write::encode::holding;
-use crate::http::wire::write::json::{Json, timestamp};
-use crate::store::Owner;
+use crate::http::state::app::CLOUD_HEADER;
 use crate::store::clouds::{CloudPage, ListedCloud, RegisteredCloud};
 use crate::store::key::CloudId;
 use crate::store::objects::cloud_object::CloudHead;
 use crate::store::objects::{ListWindow, Listed};
+use gramian_host::compute::{Admission, JobObserver, Work};
+use gramian_host::memory::Owner;
+use gramian_host::operation::intake::read_body;
+use gramian_host::wire::etag::is_known;
+use gramian_host::wire::negotiation::BodyFormat;
+use gramian_host::wire::read::members::present_unless_empty;
+use gramian_host::wire::read::points::Points;
+use gramian_host::wire::write::encode::holding;
+use gramian_host::wire::write::json::{Json, timestamp};
 use gramian_numerics::points::sampling::{NearestRange, Scales, sampling_price};
 
 /// Default number of clouds in a page.

@@ -22,17 +22,17 @@ use super::tiles::regions::RegionsRequest;
 use super::values::interpolation::{InterpolationBatchRequest, InterpolationRequest};
 use super::values::model_selection::ModelSelectionRequest;
 use super::values::posterior::{PosteriorBatchRequest, PosteriorRequest};
-use crate::http::compute::JobObserver;
 use crate::http::fields::SolverUsed;
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
-use crate::http::serve::intake::{ReceivedBody, read_body};
-use crate::http::serve::operation::{AnyOperation, REQUEST_FORMATS};
+use crate::http::serve::operation::AnyOperation;
 use crate::http::serve::steps::{self, Estimate};
 use crate::http::state::app::App;
-use crate::http::wire::read::limits::ParseContext;
-use crate::http::wire::write::json::Json;
-use crate::store::Owner;
+use gramian_host::compute::JobObserver;
+use gramian_host::memory::Owner;
+use gramian_host::operation::REQUEST_FORMATS;
+use gramian_host::operation::intake::{ReceivedBody, read_body};
+use gramian_host::wire::write::json::Json;
 
 /// A request of another operation, with the name of that operation as a further member.
 pub struct EstimateRequest;
@@ -142,10 +142,10 @@ fn name_of(
     observer: &JobObserver,
 ) -> Result<(String, ReceivedBody), Problem> {
     let (body, memory) = intake.unpack(app, observer)?;
-    let named = body.parse_with_operation::<AnyRequest>(&ParseContext::new(&app.config, observer))?;
+    let named = body.parse_with_operation::<AnyRequest>(&app.context(observer))?;
     let missing = || Problem::invalid_request("/operation", "name the operation whose request this is");
     let operation = named.operation.ok_or_else(missing)?;
-    Ok((operation, ReceivedBody { body: body.into_request(app.memory.body), memory }))
+    Ok((operation, ReceivedBody { body: body.into_request(app.memory.shares.body), memory }))
 }
 
 /// All operations that can be estimated.

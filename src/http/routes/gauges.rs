@@ -5,9 +5,9 @@ use prometheus::proto::MetricFamily;
 use prometheus::{Counter, Error, IntCounterVec, IntGaugeVec, Opts, Registry};
 
 use crate::http::state::app::App;
-use crate::process::Usage;
 use crate::store::Counts;
-use crate::store::objects::Verb;
+use gramian_host::process::counters::Usage;
+use gramian_host::store::Verb;
 
 /// Reads the metrics of load, memory, stores and process.
 ///
@@ -71,9 +71,9 @@ fn read_memory(app: &App, moment: &Moment) -> Result<(), Error> {
     let limits = [
         ("clouds", app.memory.clouds),
         ("cache", app.memory.cache),
-        ("work", app.memory.work),
-        ("intake", app.memory.intake),
-        ("jobs", app.memory.jobs),
+        ("work", app.memory.shares.work),
+        ("intake", app.memory.shares.intake),
+        ("jobs", app.memory.shares.jobs),
     ];
     moment.gauges("gramian_memory_used_bytes", "Bytes in use", "part", &used)?;
     moment.gauges("gramian_memory_limit_bytes", "Most bytes that may be in use", "part", &limits)?;

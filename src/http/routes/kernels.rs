@@ -5,7 +5,7 @@ use utoipa::ToSchema;
 
 use crate::http::fields::KernelFamily;
 use crate::http::openapi::responses::ReadProblems;
-use crate::http::wire::write::json::Json;
+use gramian_host::wire::write::json::Json;
 use gramian_numerics::kernel::{Family, WendlandSmoothness};
 
 /// A parameter of a kernel family beside `length_scale` and `variance`.

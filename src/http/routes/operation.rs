@@ -24,7 +24,7 @@ macro_rules! operation {
         )]
         pub async fn $name(
             axum::extract::State(app): axum::extract::State<std::sync::Arc<$crate::http::state::app::App>>,
-            axum::Extension(owner): axum::Extension<$crate::store::Owner>,
+            axum::Extension(owner): axum::Extension<gramian_host::memory::Owner>,
             request: axum::extract::Request,
         ) -> Result<axum::response::Response, $crate::http::problem::Problem> {
             let operation = $crate::http::serve::operation::AnyOperation::of::<$request>();

@@ -9,11 +9,11 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::gauges;
-use crate::http::metrics;
 use crate::http::openapi::responses::{ProbeProblems, ReadyProblems};
 use crate::http::problem::Problem;
 use crate::http::state::app::App;
-use crate::http::wire::write::json::Json;
+use gramian_host::state::metrics;
+use gramian_host::wire::write::json::Json;
 
 /// The state of the process.
 #[derive(Serialize, ToSchema)]
@@ -111,6 +111,6 @@ pub async fn get_version(State(app): State<Arc<App>>) -> Json<Version> {
         version: env!("CARGO_PKG_VERSION"),
         api: "v1",
         instruction_set: gramian_numerics::machine::instruction_set::InstructionSet::best().name(),
-        threads: app.config.n_threads(),
+        threads: app.settings.n_threads(),
     })
 }

@@ -2,18 +2,17 @@
 
 use super::clouds::CloudRequest;
 pub use super::estimate::OPERATIONS;
+use crate::http::fields::limits::{Limits, unobserved};
 use crate::http::problem::Problem;
 use crate::http::serve::operation::AnyOperation;
-use crate::http::wire::negotiation::{BodyFormat, Coding};
-use crate::http::wire::read::body::{RequestBody, UnpackedBody};
-use crate::http::wire::read::limits::ParseContext;
-use gramian_numerics::observer::Unobserved;
+use gramian_host::wire::negotiation::{BodyFormat, Coding};
+use gramian_host::wire::read::body::{RequestBody, UnpackedBody};
+use gramian_host::wire::read::limits::ParseContext;
 
 /// Largest size of an unpacked body, bytes.
 const LIMIT: usize = 1 << 22;
 
-const CONTEXT: ParseContext<'static> =
-    ParseContext { max_points: 1000, max_queries: 1000, max_dimension: 16, observer: &Unobserved };
+const LIMITS: Limits = Limits { max_points: 1000, max_queries: 1000, max_dimension: 16 };
 
 /// Parses a body as a request of an operation, and drops the request.
 ///
@@ -25,7 +24,9 @@ pub fn read_as(
     coding: Coding,
     bytes: &[u8],
 ) -> Result<(), Problem> {
-    (operation.parse)(&unpacked(format, coding, bytes)?, &CONTEXT).map(drop)
+    let lists = LIMITS.lists();
+    let context = unobserved(&lists);
+    (operation.parse)(&unpacked(format, coding, bytes, &context)?, &context).map(drop)
 }
 
 /// Parses a body as the registration of a cloud, and drops the request.
@@ -33,9 +34,16 @@ pub fn read_as(
 /// # Errors
 /// Returns the problem that the request would be refused with.
 pub fn read_cloud(format: BodyFormat, coding: Coding, bytes: &[u8]) -> Result<(), Problem> {
-    unpacked(format, coding, bytes)?.parse::<CloudRequest>(&CONTEXT).map(drop)
+    let lists = LIMITS.lists();
+    let context = unobserved(&lists);
+    unpacked(format, coding, bytes, &context)?.parse::<CloudRequest>(&context).map(drop)
 }
 
-fn unpacked(format: BodyFormat, coding: Coding, bytes: &[u8]) -> Result<UnpackedBody, Problem> {
-    RequestBody::new(format, coding, bytes.to_vec(), LIMIT).unpack(&CONTEXT, |_| Ok(()))
+fn unpacked(
+    format: BodyFormat,
+    coding: Coding,
+    bytes: &[u8],
+    context: &ParseContext<'_>,
+) -> Result<UnpackedBody, Problem> {
+    RequestBody::new(format, coding, bytes.to_vec(), LIMIT).unpack(context, |_| Ok(()))
 }

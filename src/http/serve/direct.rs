@@ -8,14 +8,14 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::intake::read_body;
-use super::operation::REQUEST_FORMATS;
 use super::planner::Planner;
-use crate::http::compute::{JobObserver, Work};
 use crate::http::problem::Problem;
 use crate::http::state::app::App;
-use crate::http::wire::write::json::{HasNull, to_vec};
-use crate::store::Owner;
+use gramian_host::compute::{JobObserver, Work};
+use gramian_host::memory::Owner;
+use gramian_host::operation::REQUEST_FORMATS;
+use gramian_host::operation::intake::read_body;
+use gramian_host::wire::write::json::{HasNull, to_vec};
 use gramian_numerics::machine::price::Price;
 
 /// A request that needs no model.

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use super::plan::{FitPlan, Values};
-use crate::http::compute::JobObserver;
 use crate::http::problem::Problem;
 use crate::http::state::app::App;
 use crate::store::key::ValuesKey;
 use crate::store::prepared::PreparedFit;
+use gramian_host::compute::JobObserver;
 use gramian_numerics::error::NumericsError;
 use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::model::{FittedValues, Model};

@@ -5,14 +5,15 @@ use std::sync::{Arc, OnceLock};
 use super::durable::factors;
 use super::fitted::{FitModel, Fits};
 use super::plan::{Cost, FitPlan, FitPlans};
-use super::report::AnswerHeaders;
 use super::sampling::find_sampling;
-use crate::http::compute::{Admission, JobObserver, StageTimes, Work};
 use crate::http::problem::Problem;
 use crate::http::state::app::{App, FitFailure};
-use crate::store::budget::Reservation;
 use crate::store::key::ValuesKey;
-use crate::store::prepared::{CacheOutcome, Missing, PreparedFit};
+use crate::store::prepared::{Missing, PreparedFit};
+use gramian_host::compute::{Admission, JobObserver, StageTimes};
+use gramian_host::memory::CacheOutcome;
+use gramian_host::memory::budget::Reservation;
+use gramian_host::operation::{AnswerHeaders, Outlook};
 use gramian_numerics::model::price::MakingPrice;
 use gramian_numerics::model::{Making, Model, SurfaceMaking};
 use gramian_numerics::points::sampling::Sampling;
@@ -43,10 +44,10 @@ impl Fitting<'_> {
     ///
     /// # Errors
     /// 413 if the request takes more memory than there is, and the refusals of the factorization.
-    pub async fn fits(&self, report: &mut AnswerHeaders) -> Result<(Fits, Reservation), Problem> {
+    pub async fn fits(&self, headers: &mut AnswerHeaders) -> Result<(Fits, Reservation), Problem> {
         let mut extents = Extents { main: Extent::Expected, other: Extent::Expected };
         loop {
-            if let Some(found) = self.attempt(&mut extents, report).await? {
+            if let Some(found) = self.attempt(&mut extents, headers).await? {
                 return Ok(found);
             }
             // Other tasks get their turn, however often this repeats.
@@ -55,7 +56,7 @@ impl Fitting<'_> {
     }
 
     /// Returns the fits without waiting, if nothing is missing and memory for the work is free.
-    pub fn at_hand(&self, report: &mut AnswerHeaders) -> Option<(Fits, Reservation)> {
+    pub fn at_hand(&self, headers: &mut AnswerHeaders) -> Option<(Fits, Reservation)> {
         let find = |plan: &FitPlan| {
             let stored = self.app.prepared.get(plan.key)?;
             Some(FitModel { plan: plan.clone(), stored })
@@ -71,7 +72,7 @@ impl Fitting<'_> {
         }
         let memory = self.app.prepared.try_reserve(self.admission.owner, n_bytes_of_work(self.plans.cost))?;
         for fit in [Some(&fits.main), fits.surface.as_ref()].into_iter().flatten() {
-            report.found(&fit.stored, CacheOutcome::Hit);
+            headers.found(CacheOutcome::Hit, fit.stored.times());
         }
         Some((fits, memory))
     }
@@ -83,20 +84,20 @@ impl Fitting<'_> {
     async fn attempt(
         &self,
         extents: &mut Extents,
-        report: &mut AnswerHeaders,
+        headers: &mut AnswerHeaders,
     ) -> Result<Option<(Fits, Reservation)>, Problem> {
         let Some(memory) = self.reserve(*extents).await? else { return Ok(None) };
-        let fitted = self.fitted(&self.plans.main, memory.main, &mut extents.main, report).await?;
+        let fitted = self.fitted(&self.plans.main, memory.main, &mut extents.main, headers).await?;
         let Some(main) = fitted else { return Ok(None) };
         let mut fits = Fits { app: self.app.clone(), main, surface: None, made: None };
         if let Some(other) = self.plans.other() {
-            fits.surface = self.fitted(other, memory.other, &mut extents.other, report).await?;
+            fits.surface = self.fitted(other, memory.other, &mut extents.other, headers).await?;
             if fits.surface.is_none() {
                 return Ok(None);
             }
         }
         if self.plans.has_surface {
-            fits.made = self.surface(fits.surface(), memory.surface, report).await?;
+            fits.made = self.surface(fits.surface(), memory.surface, headers).await?;
             if fits.made.is_none() {
                 return Ok(None);
             }
@@ -169,14 +170,14 @@ impl Fitting<'_> {
         plan: &FitPlan,
         memory: Option<Reservation>,
         extent: &mut Extent,
-        report: &mut AnswerHeaders,
+        headers: &mut AnswerHeaders,
     ) -> Result<Option<FitModel>, Problem> {
         let begin =
             |memory: Reservation| prepare(self.app.clone(), self.admission.clone(), plan.clone(), memory);
         match self.app.prepared.get_or_prepare(plan.key, memory, begin).await {
             Ok(Some((stored, outcome))) => {
                 if matches!(outcome, CacheOutcome::Stored | CacheOutcome::NotStored) {
-                    self.app.metrics.prepared(stored.kind());
+                    self.app.solvers.with_label_values(&[stored.kind()]).inc();
                     factors::keep(self.app, plan, &stored);
                 }
                 let is_read = stored.is_restored() && outcome != CacheOutcome::Hit;
@@ -185,7 +186,7 @@ impl Fitting<'_> {
                     // predict the time for making one.
                     self.admission.forget_work();
                 }
-                report.found(&stored, outcome);
+                headers.found(outcome, stored.times());
                 Ok(Some(FitModel { plan: plan.clone(), stored }))
             }
             Ok(None) => Ok(None),
@@ -202,7 +203,7 @@ impl Fitting<'_> {
         &self,
         fit: &FitModel,
         memory: Option<Reservation>,
-        report: &mut AnswerHeaders,
+        headers: &mut AnswerHeaders,
     ) -> Result<Option<Arc<Surface>>, Problem> {
         let fits = &self.app.prepared;
         let (key, times) = (fit.plan.key, Arc::new(OnceLock::new()));
@@ -212,29 +213,12 @@ impl Fitting<'_> {
         };
         let found = fits.get_or_make_surface(key, &fit.stored, memory, begin).await;
         match times.get() {
-            Some(&times) => report.made_surface(times),
+            Some(&times) => headers.worked(times),
             // Another request made it.
             None if was_missing => self.admission.forget_work(),
             None => {}
         }
         found.map_err(|failure| fit.plan.failed(failure))
-    }
-}
-
-/// Expected work and memory of a request.
-#[derive(Debug, Clone, Copy)]
-pub struct Outlook {
-    pub flops: f64,
-    /// Bytes that are not reserved yet.
-    pub n_bytes: usize,
-    /// Whether nothing is missing.
-    pub is_cached: bool,
-}
-
-impl Outlook {
-    /// Returns this outlook as work of an operation.
-    pub fn as_work(self, operation: &'static str) -> Work {
-        Work { operation, is_cached: self.is_cached, flops: self.flops }
     }
 }
 

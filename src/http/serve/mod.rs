@@ -9,11 +9,9 @@ pub mod durable;
 
 pub mod fitted;
 pub mod fitting;
-pub mod intake;
 pub mod plan;
 pub mod planner;
 pub mod sampling;
 
-mod report;
 #[cfg(test)]
 mod tests;

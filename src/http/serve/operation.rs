@@ -9,13 +9,13 @@ use serde::de::DeserializeOwned;
 use super::fitted::Fits;
 use super::plan::{Cost, PlannedFits, PlannedSurface, PlannedValues};
 use super::planner::{Planner, ValuesUse};
-use crate::http::compute::JobObserver;
 use crate::http::fields::HasCloud;
 use crate::http::problem::Problem;
-use crate::http::wire::negotiation::{BodyFormat, Format};
-use crate::http::wire::read::body::UnpackedBody;
-use crate::http::wire::read::limits::ParseContext;
-use crate::http::wire::write::answer::Answer;
+use gramian_host::compute::JobObserver;
+use gramian_host::wire::negotiation::Format;
+use gramian_host::wire::read::body::UnpackedBody;
+use gramian_host::wire::read::limits::ParseContext;
+use gramian_host::wire::write::answer::Answer;
 
 /// A request with the operation that it is sent to.
 pub trait Declared {
@@ -50,9 +50,6 @@ pub trait Operation: Declared + HasCloud + DeserializeOwned + Send + 'static {
     /// Returns the [`Problem`] for the client.
     fn compute(work: Self::Work, fits: &Fits, observer: &JobObserver) -> Result<Self::Answer, Problem>;
 }
-
-/// Formats of compute requests.
-pub const REQUEST_FORMATS: [BodyFormat; 2] = [BodyFormat::Json, BodyFormat::Safetensors];
 
 /// Fits that an operation needs, and the work on them.
 pub struct Plan<W> {

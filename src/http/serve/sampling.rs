@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use super::plan::{Lack, PlannedFit, PlannedValues, Values};
 use super::planner::LandmarkProbe;
-use crate::http::compute::{Admission, JobObserver};
-use crate::http::problem::{Pointers, Problem};
+use crate::http::problem::{Pointers, Problem, from_numerics};
 use crate::http::state::app::App;
 use crate::store::clouds::RegisteredCloud;
+use gramian_host::compute::{Admission, JobObserver};
 use gramian_numerics::error::NumericsError;
 use gramian_numerics::points::noise::{estimate_noise, noise_flops};
 use gramian_numerics::points::sampling::{Sampling, sampling_flops};
@@ -117,6 +117,6 @@ fn look_at<T: Send + 'static>(
     let (app, admission) = (app.clone(), admission.clone());
     async move {
         let outcome = app.compute.run(&admission, flops, look).await?.0;
-        outcome.map_err(|error| Problem::from_numerics(error, Pointers::REQUEST))
+        outcome.map_err(|error| from_numerics(error, Pointers::REQUEST))
     }
 }

@@ -16,15 +16,15 @@ use super::steps::{estimate, serve};
 use crate::config::Config;
 use crate::http::fields::{CloudRef, Fit, SolverChoice};
 use crate::http::problem::Problem;
-use crate::http::problem::slug::Slug;
+use crate::http::problem::catalogue;
 use crate::http::routes::surface::normals::NormalsRequest;
 use crate::http::routes::values::interpolation::InterpolationRequest;
-use crate::http::serve::intake::read_body;
-use crate::http::serve::operation::REQUEST_FORMATS;
 use crate::http::state::app::App;
-use crate::http::wire::read::points::Points;
-use crate::store::Owner;
-use crate::store::prepared::CacheOutcome;
+use gramian_host::memory::CacheOutcome;
+use gramian_host::memory::Owner;
+use gramian_host::operation::REQUEST_FORMATS;
+use gramian_host::operation::intake::read_body;
+use gramian_host::wire::read::points::Points;
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::surface::geometry::GeometryRequest;
@@ -84,7 +84,7 @@ async fn the_solver_follows_the_request_and_the_limit_of_the_dense_one() {
     assert_eq!(plan(1001, SolverChoice::Auto).unwrap(), SolverKind::Local);
     assert_eq!(plan(10, SolverChoice::Local).unwrap(), SolverKind::Local);
     let refused = plan(1001, SolverChoice::Dense).unwrap_err();
-    assert_eq!(refused.slug(), Slug::ProblemTooLarge);
+    assert_eq!(refused.slug(), catalogue::PROBLEM_TOO_LARGE);
 }
 
 #[tokio::test]
@@ -99,7 +99,7 @@ async fn a_fit_lacks_what_it_would_have_to_choose() {
     assert_eq!(surface(fit(20, SolverChoice::Dense)).lack(), Some(Lack::Scales));
     assert_eq!(surface(fit(20, SolverChoice::Local)).lack(), None);
     let short = planner.values_fit(fit(20, SolverChoice::Auto), GivenValues::one(vec![0.0; 19]), None);
-    assert_eq!(short.err().unwrap().slug(), Slug::LengthMismatch);
+    assert_eq!(short.err().unwrap().slug(), catalogue::LENGTH_MISMATCH);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -133,7 +133,7 @@ async fn those_who_share_a_computation_share_its_failure() {
     let asked = [&inline, &by_id].map(|body| interpolated(&app, body));
     for answer in futures_util::future::join_all(asked).await {
         let problem = answer.err().unwrap();
-        assert_eq!(problem.slug(), Slug::DuplicatePoints);
+        assert_eq!(problem.slug(), catalogue::DUPLICATE_POINTS);
         let document = serde_json::to_value(problem.document("")).unwrap();
         assert_eq!(document["point_indices"], json!([3, 7]));
     }
@@ -161,7 +161,7 @@ async fn memory_is_free_again_once_an_answer_is_sent_or_nobody_waits() {
 async fn what_memory_can_never_hold_is_refused_before_it_is_begun() {
     let app = app(&["--memory-bytes", "134217728"]).await;
     let problem = interpolated(&app, &interpolation(4900)).await.err().unwrap();
-    assert_eq!(problem.slug(), Slug::ProblemTooLarge);
+    assert_eq!(problem.slug(), catalogue::PROBLEM_TOO_LARGE);
     assert_eq!(app.prepared.n_reserved(), 0);
 }
 
@@ -198,6 +198,6 @@ async fn clouds_that_only_the_store_has_are_read_from_it() {
     serve(second, OWNER, request(&body), normals).await.unwrap();
     let stranger = app(&[]).await;
     let problem = serve(stranger, OWNER, request(&body), normals).await.err().unwrap();
-    assert_eq!(problem.slug(), Slug::UnknownCloud);
+    assert_eq!(problem.slug(), catalogue::UNKNOWN_CLOUD);
     std::fs::remove_dir_all(folder).unwrap();
 }

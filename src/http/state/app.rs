@@ -1,38 +1,28 @@
-//! The application: everything that requests share.
+//! The application: the host, and what requests about clouds share on it.
 
+use std::ops::Deref;
 use std::sync::Arc;
-use std::sync::atomic::AtomicUsize;
 
-use tokio_util::sync::CancellationToken;
+use prometheus::IntCounterVec;
 
 use super::durable::Durable;
-use super::jobs::{JobLimits, Jobs};
 use crate::config::Config;
-use crate::http::access::Keys;
-use crate::http::compute::Compute;
-use crate::http::metrics::Metrics;
-use crate::http::problem::Problem;
-use crate::http::problem::slug::Slug;
+use crate::http::fields::limits::Limits;
+use crate::http::problem::{self, Problem};
 use crate::memory::Memory;
-use crate::store::Owner;
-use crate::store::budget::{BeyondBudget, Budget, Reservation};
 use crate::store::clouds::CloudStore;
+use crate::store::key::CloudId;
 use crate::store::learned::LearnedStore;
 use crate::store::prepared::{PreparedBytes, PreparedStore};
+use axum::http::HeaderName;
+use gramian_host::memory::Owner;
+use gramian_host::memory::budget::Reservation;
+use gramian_host::state::host::{Guest, Host, StartError, Subject};
 use gramian_numerics::error::NumericsError;
 
-/// Reason why the service does not start.
-#[derive(Debug, thiserror::Error)]
-pub enum StartError {
-    #[error("the store (GRAMIAN_STORE) {0}")]
-    Store(String),
-    #[error("the keys (GRAMIAN_KEYS_FILE): {0}")]
-    Keys(String),
-    #[error("the metrics cannot be named: {0}")]
-    Metrics(#[from] prometheus::Error),
-    #[error("the threads cannot be started: {0}")]
-    Threads(#[from] rayon::ThreadPoolBuildError),
-}
+/// Header with the id of the cloud that a request is about. Proxies route all requests about one cloud to one
+/// replica.
+pub const CLOUD_HEADER: HeaderName = HeaderName::from_static("gramian-cloud");
 
 /// Reason why there is no factorization.
 ///
@@ -45,25 +35,26 @@ pub enum FitFailure {
     NeedsAll,
 }
 
-/// Configuration, stores and compute pool.
+/// The host, with the stores of clouds and of what was computed from them.
 pub struct App {
+    pub host: Arc<Host>,
     pub config: Config,
     pub memory: Memory,
-    pub keys: Arc<Keys>,
-    pub metrics: Metrics,
-    /// Memory for bodies that are read, decompressed and parsed, and for requests that wait.
-    pub intake: Budget,
     pub clouds: CloudStore<Problem>,
     /// The store in which clouds outlive the process, if one is configured.
     pub durable: Option<Durable>,
-    pub jobs: Jobs,
     pub prepared: PreparedStore<FitFailure>,
     pub learned: LearnedStore<Problem>,
-    pub compute: Arc<Compute>,
-    /// Number of requests that have arrived but are not answered.
-    pub n_requests: AtomicUsize,
-    /// Cancelled when the server drains. It then finishes its requests, but is not ready for more.
-    pub draining: CancellationToken,
+    /// Solvers that were made ready, by kind.
+    pub solvers: IntCounterVec,
+}
+
+impl Deref for App {
+    type Target = Host;
+
+    fn deref(&self) -> &Host {
+        &self.host
+    }
 }
 
 impl App {
@@ -72,37 +63,40 @@ impl App {
     /// # Errors
     /// Fails if the store does not work, or the operating system refuses the threads.
     pub async fn new(config: Config) -> Result<Arc<Self>, StartError> {
-        let durable = match &config.store {
+        let durable = match &config.host.store {
             None => None,
             Some(place) => Some(Durable::open(place).await.map_err(StartError::Store)?),
         };
-        let keys = Keys::new(&config).map_err(StartError::Keys)?;
-        let (memory, n_owners) = (Memory::of(&config), config.n_owners());
-        let of_prepared =
-            PreparedBytes { kept: memory.cache, spare: memory.spare, budget: memory.work, n_owners };
-        let in_store = durable.as_ref().map(|durable| durable.objects.clone());
-        let (n_threads, max_queue) = (config.n_threads(), config.max_queue);
-        let of_jobs = JobLimits {
-            n_bytes: if in_store.is_some() { config.store_job_bytes } else { memory.jobs },
-            max_kept: config.max_jobs,
-            n_owners,
-            n_threads,
-            max_queue,
-            max_followers: config.max_connections / 2,
+        let memory = Memory::of(&config);
+        let guest = Guest {
+            shares: memory.shares,
+            lists: Limits::of(&config).lists(),
+            problems: problem::all().collect(),
+            subject: Some(Subject {
+                header: CLOUD_HEADER,
+                path: "/v1/clouds/",
+                is_id: |text| CloudId::parse(text).is_some(),
+            }),
         };
+        let in_store = durable.as_ref().map(|durable| durable.objects.0.clone());
+        let host = Host::new(config.host.clone(), guest, in_store)?;
+        let solvers = host.metrics.counters(
+            "gramian_solvers_prepared_total",
+            "Solvers prepared, by kind",
+            &["kind"],
+        )?;
+        for kind in ["dense", "pivoted", "moving", "local", "restored"] {
+            solvers.with_label_values(&[kind]);
+        }
+        let of_prepared = PreparedBytes { kept: memory.cache, spare: memory.spare };
         Ok(Arc::new(Self {
-            jobs: Jobs::new(in_store, &of_jobs),
-            intake: Budget::new(memory.intake, n_owners),
             clouds: CloudStore::new(memory.clouds),
             durable,
-            prepared: PreparedStore::new(of_prepared),
+            prepared: PreparedStore::new(of_prepared, host.work.clone()),
             learned: LearnedStore::default(),
-            compute: Arc::new(Compute::new(n_threads, max_queue, n_owners, config.deadline())?),
+            solvers,
+            host,
             memory,
-            keys: Arc::new(keys),
-            metrics: Metrics::new()?,
-            n_requests: AtomicUsize::new(0),
-            draining: CancellationToken::new(),
             config,
         }))
     }
@@ -119,12 +113,9 @@ impl App {
         n_bytes: usize,
         is_wanted: impl Fn() -> bool,
     ) -> Result<Option<Reservation>, Problem> {
-        let beyond = |BeyondBudget { limit }| {
-            let remedy = "take fewer points or queries, regularize what is singular to rounding by a larger alpha, \
-                          or raise GRAMIAN_MEMORY_BYTES";
-            Problem::too_large(Slug::ProblemTooLarge, "bytes of memory", limit, Some(n_bytes))
-                .with_remedy(remedy)
-        };
-        self.prepared.reserve(owner, n_bytes, is_wanted).await.map_err(beyond)
+        let remedy = "take fewer points or queries, regularize what is singular to rounding by a larger alpha, \
+                      or raise GRAMIAN_MEMORY_BYTES";
+        let reserved = self.prepared.reserve(owner, n_bytes, is_wanted).await;
+        reserved.map_err(|beyond| Host::beyond_memory(beyond, n_bytes, remedy))
     }
 }

@@ -5,11 +5,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use tokio::sync::Notify;
 
-use crate::store::objects::{Objects, Place, Retention};
+use crate::store::objects::{CloudObjects, Retention};
+use gramian_host::store::{Objects, Place};
 
 /// The durable store, with counters of its backlog and size.
 pub struct Durable {
-    pub objects: Arc<Objects>,
+    pub objects: CloudObjects,
     /// Number of clouds that the store refused, and how many of these have been offered again since.
     pub n_refused: AtomicU64,
     pub n_offered_again: AtomicU64,
@@ -34,7 +35,7 @@ impl Durable {
             variables.filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
         let objects = Objects::open(place, variables).await?;
         Ok(Self {
-            objects: Arc::new(objects),
+            objects: CloudObjects(Arc::new(objects)),
             n_refused: AtomicU64::new(0),
             n_offered_again: AtomicU64::new(0),
             n_clouds: AtomicU64::new(0),

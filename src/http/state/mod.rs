@@ -2,5 +2,3 @@
 
 pub mod app;
 pub mod durable;
-pub mod jobs;
-pub mod kept;

@@ -24,10 +24,11 @@ use bytes::Bytes;
 
 use super::registered::Standing;
 use super::{CloudStore, RegisteredCloud};
-use crate::store::Owner;
 use crate::store::key::CloudId;
 use crate::store::objects::cloud_object::StoredCloud;
-use crate::store::objects::{Damaged, Objects, OwnerName, Unavailable, Written};
+use crate::store::objects::{CloudObjects, Written};
+use gramian_host::memory::Owner;
+use gramian_host::store::{Damaged, OwnerName, Unavailable};
 
 /// An owner of clouds, by its number in this process and by its name in the store.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -63,7 +64,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     /// Makes a cloud outlive the process. `encode` is called only if the cloud has to be written.
     pub async fn keep<F>(
         &self,
-        objects: &Objects,
+        objects: &CloudObjects,
         holder: &Holder,
         cloud: &Arc<RegisteredCloud>,
         encode: impl FnOnce() -> F,
@@ -98,7 +99,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     /// Offers a pending cloud to the store again. Returns `None` if it is no longer pending, or was deleted.
     pub async fn offer<F>(
         &self,
-        objects: &Objects,
+        objects: &CloudObjects,
         holder: &Holder,
         cloud: &Arc<RegisteredCloud>,
         encode: impl FnOnce() -> F,
@@ -115,7 +116,13 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
 
     /// Finds a cloud in memory. The store is asked first if the cloud was last seen there `trust` ago or
     /// earlier. While the store does not answer, the cloud in memory is assumed to be still stored.
-    pub async fn recall(&self, objects: &Objects, holder: &Holder, id: CloudId, trust: Duration) -> Recalled {
+    pub async fn recall(
+        &self,
+        objects: &CloudObjects,
+        holder: &Holder,
+        id: CloudId,
+        trust: Duration,
+    ) -> Recalled {
         let Some(cloud) = self.get(holder.owner, id) else { return Recalled::Unknown };
         if cloud.is_trusted(trust) {
             return Recalled::LocalJob(cloud);
@@ -137,7 +144,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     /// [`Unavailable`].
     pub async fn take_in(
         &self,
-        objects: &Objects,
+        objects: &CloudObjects,
         holder: &Holder,
         id: CloudId,
         read: Result<StoredCloud, Damaged>,
@@ -161,7 +168,13 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
 
     /// Moves a damaged cloud aside. It holds the turn of the cloud, so this process does not write it
     /// meanwhile.
-    pub(super) async fn put_aside(&self, objects: &Objects, holder: &Holder, id: CloudId, damaged: Damaged) {
+    pub(super) async fn put_aside(
+        &self,
+        objects: &CloudObjects,
+        holder: &Holder,
+        id: CloudId,
+        damaged: Damaged,
+    ) {
         let _turn = self.turns.take((holder.owner, id)).await;
         objects.put_aside(&holder.name, id, damaged).await;
     }
@@ -173,7 +186,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     /// [`Unavailable`]: nothing is deleted, as far as the store tells.
     pub async fn forget(
         &self,
-        objects: Option<&Objects>,
+        objects: Option<&CloudObjects>,
         holder: &Holder,
         id: CloudId,
     ) -> Result<bool, Unavailable> {
@@ -202,7 +215,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
 }
 
 /// Returns whether the store still has a cloud. If the store does not answer, it is assumed to.
-async fn is_still_stored(objects: &Objects, holder: &Holder, cloud: &RegisteredCloud) -> bool {
+async fn is_still_stored(objects: &CloudObjects, holder: &Holder, cloud: &RegisteredCloud) -> bool {
     let is_missing = matches!(objects.cloud_bytes(&holder.name, cloud.id).await, Ok(None));
     cloud.set_seen(!is_missing);
     !is_missing
@@ -210,7 +223,7 @@ async fn is_still_stored(objects: &Objects, holder: &Holder, cloud: &RegisteredC
 
 /// Writes a cloud unless the store has it.
 async fn write<F>(
-    objects: &Objects,
+    objects: &CloudObjects,
     holder: &Holder,
     cloud: &RegisteredCloud,
     encode: impl FnOnce() -> F,

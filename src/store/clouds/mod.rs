@@ -10,11 +10,11 @@ mod turns;
 
 use std::sync::{Arc, OnceLock};
 
-use super::Owner;
-use super::fair_cache::{Counts, FairCache};
 use super::key::CloudId;
-use super::single_flight::{Boarding, SingleFlight};
 pub use durable::{Holder, Kept, Recalled};
+use gramian_host::memory::Owner;
+use gramian_host::memory::fair_cache::{Counts, FairCache};
+use gramian_host::memory::single_flight::{Boarding, SingleFlight};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
 pub use page::{CloudPage, ListedCloud};

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use std::time::SystemTime;
 
 use super::{CloudStore, Holder, RegisteredCloud};
-use crate::store::Owner;
 use crate::store::key::CloudId;
 use crate::store::objects::cloud_object::CloudHead;
-use crate::store::objects::{ListWindow, Listed, Objects, Unavailable};
+use crate::store::objects::{CloudObjects, ListWindow, Listed};
+use gramian_host::memory::Owner;
+use gramian_host::store::Unavailable;
 
 /// A cloud in a list: in full if memory has it, otherwise its head in the store.
 pub enum ListedCloud {
@@ -55,7 +56,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     /// [`Unavailable`].
     pub async fn page(
         &self,
-        objects: Option<&Objects>,
+        objects: Option<&CloudObjects>,
         holder: &Holder,
         mut window: ListWindow,
         unstored: HashMap<CloudId, Listed>,
@@ -78,7 +79,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     /// Returns the clouds at some places, without those that are gone or damaged.
     async fn described(
         &self,
-        objects: Option<&Objects>,
+        objects: Option<&CloudObjects>,
         holder: &Holder,
         places: &[Listed],
     ) -> Result<Vec<ListedCloud>, Unavailable> {

@@ -20,8 +20,8 @@ use std::time::{Duration, SystemTime};
 
 use bytes::Bytes;
 
-use super::Damaged;
 use crate::store::key::CloudId;
+use gramian_host::store::Damaged;
 use gramian_numerics::points::cloud::Cloud;
 
 const MAGIC: &[u8; 16] = b"gramian cloud 1\n";

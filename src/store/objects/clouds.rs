@@ -12,8 +12,10 @@ use futures_util::{StreamExt, TryStreamExt};
 use object_store::path::Path;
 use object_store::{GetOptions, GetRange, ObjectMeta, ObjectStoreExt, PutPayload};
 
+use super::CloudObjects;
 use super::cloud_object::{self, CloudHead};
-use super::{CloudId, Damaged, Objects, OwnerName, Unavailable, Verb};
+use crate::store::key::CloudId;
+use gramian_host::store::{Damaged, OwnerName, Unavailable, Verb};
 
 /// Number of heads read concurrently.
 const HEADS_AT_ONCE: usize = 32;
@@ -87,7 +89,7 @@ pub enum Written {
     Before(SystemTime),
 }
 
-impl Objects {
+impl CloudObjects {
     /// Writes the object of a cloud, made by [`cloud_object::encode`], unless it exists.
     ///
     /// # Errors
@@ -120,7 +122,7 @@ impl Objects {
     /// [`Unavailable`].
     pub async fn cloud_bytes(&self, owner: &OwnerName, id: CloudId) -> Result<Option<u64>, Unavailable> {
         let name = self.cloud(owner, id);
-        let found = self.counted(Verb::Find, &name, self.store.head(&name).await)?;
+        let found = self.counted(Verb::Find, &name, self.backend().head(&name).await)?;
         Ok(found.map(|found| found.size))
     }
 
@@ -130,7 +132,7 @@ impl Objects {
     /// [`Unavailable`].
     pub async fn get_cloud(&self, owner: &OwnerName, id: CloudId) -> Result<Option<Bytes>, Unavailable> {
         let name = self.cloud(owner, id);
-        let found = async { self.store.get(&name).await?.bytes().await };
+        let found = async { self.backend().get(&name).await?.bytes().await };
         self.counted(Verb::Read, &name, found.await)
     }
 
@@ -171,7 +173,7 @@ impl Objects {
             Some(Ok(head)) => head,
         };
         let name = self.cloud(owner, id);
-        let found = self.counted(Verb::Read, &name, self.store.get(&name).await)?;
+        let found = self.counted(Verb::Read, &name, self.backend().get(&name).await)?;
         let Some(found) = found else { return Ok(None) };
         let mut check = cloud_object::Check::new(&head, found.meta.size);
         let mut bytes = found.into_stream();
@@ -213,13 +215,13 @@ impl Objects {
         mut unstored: HashMap<CloudId, Listed>,
     ) -> Result<(Vec<Listed>, bool), Unavailable> {
         let folder = self.path(&[&owner.0, FOLDER]);
-        let (mut first, mut names) = (window.begin(), self.store.list(Some(&folder)));
+        let (mut first, mut names) = (window.begin(), self.backend().list(Some(&folder)));
         while let Some(object) = self.counted_item(&folder, names.next().await)? {
             let Some(place) = Listed::of(&object) else { continue };
             unstored.remove(&place.id);
             first.add(place);
         }
-        self.tally.add(Verb::List, true);
+        self.tally().add(Verb::List, true);
         unstored.into_values().for_each(|place| first.add(place));
         Ok(first.into_places())
     }
@@ -253,7 +255,7 @@ impl Objects {
     async fn delete_remains(&self, owner: &OwnerName, id: CloudId) -> Result<(), Unavailable> {
         self.delete_factors(owner, id).await?;
         let aside = self.aside(owner, id);
-        if self.counted(Verb::Find, &aside, self.store.head(&aside).await)?.is_some() {
+        if self.counted(Verb::Find, &aside, self.backend().head(&aside).await)?.is_some() {
             self.delete(&aside).await?;
         }
         Ok(())
@@ -265,7 +267,7 @@ impl Objects {
     /// [`Unavailable`].
     pub(super) async fn let_go(&self, owner: &OwnerName, place: Listed) -> Result<bool, Unavailable> {
         let name = self.cloud(owner, place.id);
-        let found = self.counted(Verb::Find, &name, self.store.head(&name).await)?;
+        let found = self.counted(Verb::Find, &name, self.backend().head(&name).await)?;
         // Buckets tell the time of one object by the second, and that of objects in a list more precisely.
         let most = place.since + Duration::from_secs(1);
         let is_same = found.is_some_and(|found| SystemTime::from(found.last_modified) <= most);
@@ -279,7 +281,7 @@ impl Objects {
         }
         let (name, aside) = (self.cloud(owner, id), self.aside(owner, id));
         self.report(&name, damaged);
-        let is_aside = self.store.rename(&name, &aside).await.is_ok();
+        let is_aside = self.backend().rename(&name, &aside).await.is_ok();
         tracing::error!(object = %name, %aside, is_aside, "a damaged cloud is set aside");
     }
 
@@ -288,9 +290,9 @@ impl Objects {
         let mut n_bytes = FIRST_BYTES;
         loop {
             let options = GetOptions { range: Some(GetRange::Bounded(0..n_bytes)), ..GetOptions::default() };
-            let found = async { self.store.get_opts(name, options).await?.bytes().await }.await;
+            let found = async { self.backend().get_opts(name, options).await?.bytes().await }.await;
             // No store returns a range of an empty object.
-            if found.is_err() && self.store.head(name).await.is_ok_and(|empty| empty.size == 0) {
+            if found.is_err() && self.backend().head(name).await.is_ok_and(|empty| empty.size == 0) {
                 return Ok(Some(Bytes::new()));
             }
             let Some(bytes) = self.counted(Verb::Read, name, found)? else { return Ok(None) };

@@ -16,9 +16,11 @@ use object_store::path::Path;
 use object_store::{ObjectMeta, ObjectStoreExt};
 use serde::{Deserialize, Serialize};
 
-use super::retention::AT_WORK;
-use super::room::Room;
-use super::{CloudId, Damaged, Objects, OwnerName, Unavailable, Verb};
+use super::CloudObjects;
+use crate::store::key::CloudId;
+use gramian_host::store::AT_WORK;
+use gramian_host::store::room::Room;
+use gramian_host::store::{Damaged, OwnerName, Unavailable, Verb};
 
 const FOLDER: &str = "factors";
 
@@ -71,7 +73,7 @@ impl FactorHead {
     }
 }
 
-impl Objects {
+impl CloudObjects {
     /// Writes a factor atomically. Returns the bytes written.
     ///
     /// # Errors
@@ -94,7 +96,7 @@ impl Objects {
     /// [`Unavailable`].
     pub async fn find_factor(&self, name: &FactorName) -> Result<Option<FoundFactor>, Unavailable> {
         let path = self.factor(name);
-        let found = self.counted(Verb::Find, &path, self.store.head(&path).await)?;
+        let found = self.counted(Verb::Find, &path, self.backend().head(&path).await)?;
         // An empty object has no range that could be read. It counts as absent and is written again.
         let Some(ObjectMeta { size: n_bytes @ 1.., .. }) = found else { return Ok(None) };
         let Some(first) = self.factor_range(name, 0..MAX_LINE.min(n_bytes)).await? else { return Ok(None) };
@@ -116,13 +118,13 @@ impl Objects {
         range: Range<u64>,
     ) -> Result<Option<Bytes>, Unavailable> {
         let path = self.factor(name);
-        self.counted(Verb::Read, &path, self.store.get_range(&path, range).await)
+        self.counted(Verb::Read, &path, self.backend().get_range(&path, range).await)
     }
 
     /// Deletes a damaged factor.
     pub async fn drop_factor(&self, name: &FactorName, damaged: Damaged) {
         let path = self.factor(name);
-        self.n_damaged.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        self.count_damaged();
         let is_gone = self.delete(&path).await.is_ok();
         tracing::error!(object = %path, reason = damaged.0, is_gone, "a stored factor is damaged and is computed again");
     }

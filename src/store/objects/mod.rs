@@ -1,192 +1,38 @@
-//! Objects that outlive the process: clouds, factors and jobs, in a directory or in object storage.
+//! Clouds and factors as objects that outlive the process.
 //!
 //! NAMES. `<owner>/clouds/<cloud id>` is a cloud. The names and times of these objects are the list of clouds
-//! (clouds.rs).
+//! (clouds.rs). FACTORS are under `<owner>/factors/` and are deleted with their clouds (factors.rs).
 //!
-//! FACTORS are under `<owner>/factors/` and are deleted with their clouds (factors.rs).
-//!
-//! JOBS are under `<owner>/jobs/`, `<owner>/open/` and `<owner>/claims/` (jobs/).
-//!
-//! WRITES are atomic. A file is written under a temporary name, flushed and renamed. A bucket shows an object
-//! when all of it has arrived. A cloud is written once: a second writer finds it.
+//! A cloud is written once: a second writer finds it.
 //!
 //! READS return exactly what was written, or nothing (cloud_object.rs). A damaged cloud is reported and moved
 //! to `damaged/`. It then no longer exists under its name and can be posted again.
 //!
-//! RETENTION. A sweep deletes clouds beyond an age or a number of bytes. It also deletes left-overs of
-//! processes killed while writing a file, and of deleted clouds (retention.rs). Left-overs of jobs and claims
-//! are swept in jobs/.
+//! RETENTION. A sweep deletes clouds beyond an age or a number of bytes, and left-overs of deleted clouds
+//! (retention.rs).
 
 pub mod cloud_object;
 mod clouds;
 pub mod factors;
-pub mod jobs;
-mod patience;
-pub mod pieces;
-mod place;
 mod retention;
-pub mod room;
-mod tally;
 #[cfg(test)]
 mod tests;
 
-use std::path::PathBuf;
+use std::ops::Deref;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Duration;
 
-use object_store::path::Path;
-use object_store::{Error, ObjectStore, ObjectStoreExt, PutMode, PutOptions, PutPayload};
-use uuid::Uuid;
-
-use super::key::CloudId;
 pub use clouds::{ListWindow, Listed, Written};
-use patience::WithTimeouts;
-pub use place::Place;
+use gramian_host::store::Objects;
 pub use retention::{Retention, Swept};
-pub use tally::{Tally, Verb};
 
-/// Reason why an object is not what was written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct Damaged(pub &'static str);
+/// The clouds and factors among the objects of a store.
+#[derive(Clone)]
+pub struct CloudObjects(pub Arc<Objects>);
 
-/// A failed call to the store.
-#[derive(Debug, Clone, thiserror::Error)]
-#[error("the store failed to {verb} {name}: {reason}")]
-pub struct Unavailable {
-    verb: Verb,
-    name: String,
-    reason: String,
-}
+impl Deref for CloudObjects {
+    type Target = Objects;
 
-/// Time in which a store must show at the start that it works.
-const PATIENCE: Duration = Duration::from_secs(20);
-
-/// The store behind all caches in memory.
-pub struct Objects {
-    store: Arc<dyn ObjectStore>,
-    root: Path,
-    /// Directory of the files, if the store is a directory.
-    directory: Option<PathBuf>,
-    /// Whether objects are kept in the memory of this process.
-    in_memory: bool,
-    tally: Tally,
-    n_damaged: AtomicU64,
-}
-
-/// Name of an owner of objects. It does not depend on the order of keys in a configuration.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct OwnerName(pub String);
-
-impl Objects {
-    /// Opens a place, and checks that it can be written to and read.
-    ///
-    /// # Errors
-    /// Returns what is wrong with the place.
-    pub async fn open(
-        place: &Place,
-        variables: impl IntoIterator<Item = (String, String)>,
-    ) -> Result<Self, String> {
-        let (store, root) = place.open(variables)?;
-        let directory = match place {
-            Place::Directory(directory) => Some(directory.clone()),
-            Place::Bucket(_) => None,
-        };
-        let objects = Self { directory, ..Self::over(store, root) };
-        let name = objects.path(&["probe", &Uuid::now_v7().to_string()]);
-        let probe = async {
-            objects.store.put(&name, PutPayload::from_static(b"probe")).await?;
-            objects.store.get(&name).await?.bytes().await?;
-            objects.store.delete(&name).await
-        };
-        match tokio::time::timeout(PATIENCE, probe).await {
-            Ok(Ok(())) => Ok(objects),
-            Ok(Err(error)) => Err(format!("does not work: {error}")),
-            Err(_) => Err(format!("does not answer within {} s", PATIENCE.as_secs())),
-        }
-    }
-
-    /// Creates a store in memory, limited only by memory.
-    pub fn in_memory() -> Self {
-        let memory = Arc::new(object_store::memory::InMemory::new());
-        Self { in_memory: true, ..Self::over(memory, Path::default()) }
-    }
-
-    /// Creates a store over any backend, with the prefix of all names.
-    pub fn over(store: Arc<dyn ObjectStore>, root: Path) -> Self {
-        let store = Arc::new(WithTimeouts::new(store));
-        let (tally, n_damaged) = (Tally::default(), AtomicU64::new(0));
-        Self { store, root, directory: None, in_memory: false, tally, n_damaged }
-    }
-
-    /// Returns whether objects are kept in the memory of this process alone.
-    pub fn in_memory_alone(&self) -> bool {
-        self.in_memory
-    }
-
-    /// Counts of calls to the store since the start.
-    pub fn tally(&self) -> &Tally {
-        &self.tally
-    }
-
-    /// Number of damaged objects found since the start.
-    pub fn n_damaged(&self) -> u64 {
-        self.n_damaged.load(Ordering::Relaxed)
-    }
-
-    /// Counts and logs a damaged object.
-    fn report(&self, name: &Path, damaged: Damaged) {
-        self.n_damaged.fetch_add(1, Ordering::Relaxed);
-        tracing::error!(object = %name, reason = damaged.0, "an object is damaged");
-    }
-
-    /// Deletes an object. Returns whether it existed, as far as the store tells: buckets do not.
-    async fn delete(&self, name: &Path) -> Result<bool, Unavailable> {
-        Ok(self.counted(Verb::Delete, name, self.store.delete(name).await)?.is_some())
-    }
-
-    async fn put(&self, name: &Path, payload: PutPayload) -> Result<(), Unavailable> {
-        let written = self.store.put(name, payload).await;
-        written
-            .map(|_| self.tally.add(Verb::Write, true))
-            .map_err(|error| self.failed(Verb::Write, name, error))
-    }
-
-    /// Writes an object unless it exists. Returns whether it was written.
-    async fn create(&self, name: &Path, payload: PutPayload) -> Result<bool, Unavailable> {
-        match self.store.put_opts(name, payload, PutOptions::from(PutMode::Create)).await {
-            Ok(_) => {
-                self.tally.add(Verb::Write, true);
-                Ok(true)
-            }
-            Err(Error::AlreadyExists { .. }) => Ok(false),
-            Err(error) => Err(self.failed(Verb::Write, name, error)),
-        }
-    }
-
-    /// Counts an answer of the store. A missing object becomes `None`.
-    fn counted<T>(
-        &self,
-        verb: Verb,
-        name: &Path,
-        answer: Result<T, Error>,
-    ) -> Result<Option<T>, Unavailable> {
-        let found = match answer {
-            Ok(found) => Some(found),
-            Err(Error::NotFound { .. }) => None,
-            Err(error) => return Err(self.failed(verb, name, error)),
-        };
-        self.tally.add(verb, true);
-        Ok(found)
-    }
-
-    fn failed(&self, verb: Verb, name: &Path, error: Error) -> Unavailable {
-        self.tally.add(verb, false);
-        Unavailable { verb, name: name.to_string(), reason: error.to_string() }
-    }
-
-    fn path(&self, parts: &[&str]) -> Path {
-        self.root.parts().chain(parts.iter().map(|&part| part.into())).collect()
+    fn deref(&self) -> &Objects {
+        &self.0
     }
 }

@@ -3,21 +3,17 @@
 
 use std::cmp::Reverse;
 use std::collections::{HashSet, VecDeque};
-use std::path::Path;
 use std::time::{Duration, SystemTime};
 
-use futures_util::TryStreamExt;
 use object_store::ObjectMeta;
 
 use super::clouds::FOLDER;
-use super::tally::Verb;
-use super::{CloudId, Listed, Objects, OwnerName, Unavailable};
+use super::{CloudObjects, Listed};
+use crate::store::key::CloudId;
+use gramian_host::store::{OwnerName, Unavailable};
 
 /// Time for which damaged objects are kept for diagnosis.
 const DAMAGED: Duration = Duration::from_secs(7 * 24 * 3600);
-
-/// Longest time that a writer may take to write an object.
-pub(super) const AT_WORK: Duration = Duration::from_secs(3600);
 
 /// A folder of drafts of this service before 0.1.0, which listed clouds by empty objects.
 const FORMER_LIST: &str = "listed";
@@ -92,7 +88,7 @@ fn next_to_go(holdings: &mut [Holding], limits: Retention, now: SystemTime) -> O
     Some((holding.owner.clone(), holding.pop_oldest()?))
 }
 
-impl Objects {
+impl CloudObjects {
     /// Deletes what exceeds the limits at time `now`, and counts the rest.
     ///
     /// # Errors
@@ -118,26 +114,6 @@ impl Objects {
         Ok(swept)
     }
 
-    /// Removes unfinished files of processes that ended while writing. No list shows their names.
-    async fn remove_half_written(&self, now: SystemTime) {
-        let Some(directory) = self.directory.clone() else { return };
-        let removed = tokio::task::spawn_blocking(move || remove_half_written(&directory, now)).await;
-        match removed {
-            Ok(0) => {}
-            Ok(n_files) => tracing::info!(n_files, "incomplete files were removed"),
-            Err(error) => tracing::error!(%error, "incomplete files could not be removed"),
-        }
-    }
-
-    /// Owners of any object in the store.
-    pub(super) async fn owners(&self) -> Result<Vec<OwnerName>, Unavailable> {
-        let found = self.store.list_with_delimiter(Some(&self.root)).await;
-        let found = self.counted(Verb::List, &self.root, found)?;
-        let folders = found.into_iter().flat_map(|found| found.common_prefixes);
-        let name = |folder: object_store::path::Path| Some(OwnerName(folder.filename()?.to_owned()));
-        Ok(folders.filter_map(name).filter(|owner| owner.0 != "probe").collect())
-    }
-
     /// Clouds of an owner with their sizes.
     async fn kept(&self, owner: &OwnerName) -> Result<Vec<Kept>, Unavailable> {
         let found = self.objects_in(owner, &[FOLDER]).await?;
@@ -161,39 +137,4 @@ impl Objects {
         }
         Ok(())
     }
-
-    pub(super) async fn objects_in(
-        &self,
-        owner: &OwnerName,
-        folder: &[&str],
-    ) -> Result<Vec<ObjectMeta>, Unavailable> {
-        let folder = self.path(&[&[&*owner.0], folder].concat());
-        let found = self.store.list(Some(&folder)).try_collect().await;
-        Ok(self.counted(Verb::List, &folder, found)?.unwrap_or_default())
-    }
-}
-
-/// Removes unfinished files in this folder and all folders below. Returns their number. Files that cannot be
-/// read or removed are tried again in the next sweep.
-fn remove_half_written(directory: &Path, now: SystemTime) -> usize {
-    let mut n_removed = 0;
-    for entry in std::fs::read_dir(directory).into_iter().flatten().flatten() {
-        let (path, name) = (entry.path(), entry.file_name());
-        let Ok(about) = entry.metadata() else { continue };
-        if about.is_dir() {
-            n_removed += remove_half_written(&path, now);
-            continue;
-        }
-        let age = about.modified().ok().and_then(|since| now.duration_since(since).ok());
-        if is_half_written(&name.to_string_lossy()) && age.is_some_and(|age| age > AT_WORK) {
-            n_removed += usize::from(std::fs::remove_file(path).is_ok());
-        }
-    }
-    n_removed
-}
-
-/// Recognises the names that the `object_store` crate gives to unfinished files: a number after `#`.
-fn is_half_written(name: &str) -> bool {
-    name.rsplit_once('#')
-        .is_some_and(|(_, number)| !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit()))
 }

@@ -1,18 +1,24 @@
 use std::collections::HashMap;
-use std::time::SystemTime;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, SystemTime};
 
 use bytes::Bytes;
 use object_store::memory::InMemory;
+use object_store::path::Path;
+use object_store::{ObjectStoreExt, PutPayload};
 
 use super::cloud_object::CUT;
 use super::factors::{FactorHead, FactorName};
 use super::*;
-use crate::store::Owner;
 use crate::store::clouds::{CloudStore, RegisteredCloud};
+use crate::store::key::CloudId;
+use gramian_host::memory::Owner;
+use gramian_host::store::{OwnerName, Place, Verb};
 use gramian_numerics::points::cloud::Cloud;
 
-fn objects() -> Objects {
-    Objects::over(Arc::new(InMemory::new()), Path::from("some/prefix"))
+fn objects() -> CloudObjects {
+    CloudObjects(Arc::new(Objects::over(Arc::new(InMemory::new()), Path::from("some/prefix"))))
 }
 
 fn owner(name: &str) -> OwnerName {
@@ -24,31 +30,36 @@ fn registered(first: f64, dimension: usize) -> Arc<RegisteredCloud> {
     CloudStore::<()>::new(1 << 20).register(Owner(0), cloud, None).0
 }
 
-async fn put(objects: &Objects, owner: &OwnerName, cloud: &Arc<RegisteredCloud>) -> Written {
+async fn put(objects: &CloudObjects, owner: &OwnerName, cloud: &Arc<RegisteredCloud>) -> Written {
     let pieces = cloud_object::encode(cloud.stored());
     objects.put_cloud(owner, cloud.id, pieces).await.unwrap()
 }
 
 /// Lists at most `n` ids after a place, and returns the place of the last.
-async fn listed(objects: &Objects, owner: &OwnerName, window: ListWindow) -> (Vec<CloudId>, Option<Listed>) {
+async fn listed(
+    objects: &CloudObjects,
+    owner: &OwnerName,
+    window: ListWindow,
+) -> (Vec<CloudId>, Option<Listed>) {
     let (places, _) = objects.list_first(owner, window, HashMap::new()).await.unwrap();
     (places.iter().map(|place| place.id).collect(), places.last().copied())
 }
 
-async fn all_listed(objects: &Objects, owner: &OwnerName) -> Vec<CloudId> {
+async fn all_listed(objects: &CloudObjects, owner: &OwnerName) -> Vec<CloudId> {
     listed(objects, owner, ListWindow { after: None, n: 99 }).await.0
 }
 
-/// Objects in a temporary directory, whose times can be set.
+/// CloudObjects in a temporary directory, whose times can be set.
 struct Dated {
     directory: PathBuf,
-    objects: Objects,
+    objects: CloudObjects,
 }
 
 impl Dated {
     async fn new(name: &str) -> Self {
         let directory = std::env::temp_dir().join(format!("gramian-{name}-{}", std::process::id()));
         let objects = Objects::open(&Place::Directory(directory.clone()), []).await.unwrap();
+        let objects = CloudObjects(Arc::new(objects));
         Self { directory, objects }
     }
 
@@ -133,28 +144,32 @@ async fn what_is_damaged_is_put_aside_and_can_be_written_again() {
     let cloud = registered(0.0, 2);
     put(&objects, &owner, &cloud).await;
     let name = objects.cloud(&owner, cloud.id);
-    objects.store.put(&name, PutPayload::from_static(b"gramian cloud 1\nand nothing else")).await.unwrap();
+    objects
+        .backend()
+        .put(&name, PutPayload::from_static(b"gramian cloud 1\nand nothing else"))
+        .await
+        .unwrap();
     let damaged = objects.head(&owner, cloud.id).await.unwrap().unwrap().unwrap_err();
     objects.put_aside(&owner, cloud.id, damaged).await;
     assert_eq!((objects.n_damaged(), objects.get_cloud(&owner, cloud.id).await.unwrap()), (1, None));
     assert_eq!(put(&objects, &owner, &cloud).await, Written::Now);
     // Damage is also found when the cloud is written again.
-    objects.store.put(&name, PutPayload::from_static(b"something else")).await.unwrap();
+    objects.backend().put(&name, PutPayload::from_static(b"something else")).await.unwrap();
     assert_eq!(put(&objects, &owner, &cloud).await, Written::Now);
     let bytes = objects.get_cloud(&owner, cloud.id).await.unwrap().unwrap();
     assert!(cloud_object::decode(cloud.id, &bytes).is_ok() && objects.n_damaged() == 2);
     // An empty object is found too, although no store returns a range of it.
-    objects.store.put(&name, PutPayload::new()).await.unwrap();
+    objects.backend().put(&name, PutPayload::new()).await.unwrap();
     assert!(objects.heads(&owner, vec![cloud.id]).await.unwrap()[0].1.is_err());
     assert_eq!(put(&objects, &owner, &cloud).await, Written::Now);
-    objects.store.put(&name, PutPayload::new()).await.unwrap();
+    objects.backend().put(&name, PutPayload::new()).await.unwrap();
     assert!(objects.delete_cloud(&owner, cloud.id).await.unwrap());
     assert_eq!((put(&objects, &owner, &cloud).await, objects.n_damaged()), (Written::Now, 3));
     // Damage in the points alone, or behind them, is found too.
     for at in [bytes.len() - 1, bytes.len() - 40] {
         let mut other = bytes.to_vec();
         other[at] ^= 1;
-        objects.store.put(&name, other.into()).await.unwrap();
+        objects.backend().put(&name, other.into()).await.unwrap();
         assert_eq!(put(&objects, &owner, &cloud).await, Written::Now);
     }
     assert_eq!(put(&objects, &owner, &cloud).await, Written::Before(cloud.created_at()));
@@ -179,7 +194,7 @@ async fn factors_go_with_their_clouds_whoever_wrote_them_last() {
         objects.put_factor(&name_of(cloud), &FactorHead::new(2, 1.0, 1.0), pieces).await.unwrap();
     }
     // An empty object is no factor, and can be written.
-    objects.store.put(&objects.factor(&name_of(&kept)), PutPayload::new()).await.unwrap();
+    objects.backend().put(&objects.factor(&name_of(&kept)), PutPayload::new()).await.unwrap();
     assert!(objects.find_factor(&name_of(&kept)).await.unwrap().is_none());
     let pieces = [Bytes::from_static(b"numbers")].into_iter();
     objects.put_factor(&name_of(&kept), &FactorHead::new(2, 1.0, 1.0), pieces).await.unwrap();
@@ -197,6 +212,8 @@ async fn factors_go_with_their_clouds_whoever_wrote_them_last() {
 async fn files_that_were_never_whole_go_after_an_hour() {
     let directory = std::env::temp_dir().join(format!("gramian-half-written-{}", std::process::id()));
     let objects = Objects::open(&Place::Directory(directory.clone()), []).await.unwrap();
+    let objects = CloudObjects(Arc::new(objects));
+    let objects = CloudObjects(Arc::new(objects));
     let folder = directory.join("one/clouds");
     std::fs::create_dir_all(&folder).unwrap();
     for name in ["ab#1", "ab#x", "ab"] {
@@ -299,6 +316,6 @@ async fn what_was_damaged_goes_after_a_week() {
     let aside = objects.path(&["one", "damaged", &gone.id.to_string()]);
     for (days, is_there) in [(6, true), (8, false)] {
         objects.sweep(Retention::default(), now + Duration::from_secs(86400 * days)).await.unwrap();
-        assert_eq!(objects.store.head(&aside).await.is_ok(), is_there);
+        assert_eq!(objects.backend().head(&aside).await.is_ok(), is_there);
     }
 }

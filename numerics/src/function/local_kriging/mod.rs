@@ -34,7 +34,7 @@ use rayon::prelude::*;
 
 use super::deviations::JetDeviations;
 use super::posterior::Variances;
-use crate::error::Result;
+use crate::error::{NumericsError, Result};
 use crate::machine::instruction_set::InstructionSet;
 use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
@@ -251,7 +251,7 @@ impl LocalKriging {
                 observer.checkpoint()?;
                 room.put(&fit, batch * lanes, sure.len() / n_sure)?;
                 n_dependent.fetch_add(fit.answer(room, batch * lanes, jets, sure)?, Ordering::Relaxed);
-                Ok(())
+                Ok::<_, NumericsError>(())
             },
         )?;
         let jets = Jets::of(fit.layout, packed);

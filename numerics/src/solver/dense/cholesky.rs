@@ -215,7 +215,7 @@ fn recurse(
     leaf: &mut Leaf,
     observer: &dyn Observer,
 ) -> Result<(), Stop> {
-    observer.checkpoint().map_err(Stop::Cancelled)?;
+    observer.checkpoint().map_err(|end| Stop::Cancelled(end.into()))?;
     let n = a.nrows();
     if n <= LEAF_SIZE {
         return leaf.factorize(a, floor).map_err(|index| Stop::NotPositive(first + index));
@@ -232,7 +232,7 @@ fn recurse(
 fn solve_below(l: MatRef<'_, f64>, mut below: MatMut<'_, f64>, observer: &dyn Observer) -> Result<(), Stop> {
     let flops_per_row = (l.nrows() * l.nrows()) as f64;
     for (first, n_rows) in pieces(below.nrows(), flops_per_row) {
-        observer.checkpoint().map_err(Stop::Cancelled)?;
+        observer.checkpoint().map_err(|end| Stop::Cancelled(end.into()))?;
         let rows = below.rb_mut().subrows_mut(first, n_rows);
         let par = parallelism(flops_per_row * n_rows as f64);
         solve_lower_triangular_in_place(l, rows.transpose_mut(), par);
@@ -256,7 +256,7 @@ fn update(
 ) -> Result<(), Stop> {
     let (n, k) = (below.nrows(), below.ncols());
     for (first, width) in pieces(n, (n * k) as f64) {
-        observer.checkpoint().map_err(Stop::Cancelled)?;
+        observer.checkpoint().map_err(|end| Stop::Cancelled(end.into()))?;
         let (diagonal, rest) = (below.subrows(first, width), first + width);
         let par = parallelism((width * (n - first) * k) as f64);
         triangular::matmul(

@@ -18,7 +18,7 @@ use std::sync::Arc;
 use faer::{MatMut, MatRef};
 use rayon::prelude::*;
 
-use crate::error::Result;
+use crate::error::{NumericsError, Result};
 use crate::kernel::Kernel;
 use crate::machine::pages::{Buffer, SpareBuffer};
 use crate::observer::Observer;
@@ -124,7 +124,7 @@ impl Packed {
                     }
                     column[end..].fill(0.0);
                 }
-                Ok(())
+                Ok::<_, NumericsError>(())
             },
         )?;
         Ok(this)

@@ -62,7 +62,7 @@ impl PivotedCholesky {
         let attempt = |max_rank: usize| {
             let mut buffer = vec![0.0; n_numbers(n, max_rank)];
             let pivots = Pivoting::new(cloud, kernel, regularization, &mut buffer).run(max_rank, observer)?;
-            Ok((buffer, pivots))
+            Ok::<_, NumericsError>((buffer, pivots))
         };
         // Smooth kernels have small ranks, and their buffer is small enough to be cut to size by copying. A
         // rough kernel begins again, after 5 n³/96 of its n³/3 flops.

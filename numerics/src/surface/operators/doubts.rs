@@ -103,7 +103,7 @@ impl Judged<'_> {
             observer.checkpoint()?;
             near.nearest_into(places.point(at), AROUND, found);
             let count = if found[0].squared_distance == 0.0 { 1 } else { found.len() };
-            Ok(!found[..count].iter().all(|n| errors[n.point] <= most))
+            Ok::<_, NumericsError>(!found[..count].iter().all(|n| errors[n.point] <= most))
         };
         let doubtful: Vec<bool> =
             (0..regular.len()).into_par_iter().map_init(Vec::new, is_doubtful).collect::<Result<_, _>>()?;

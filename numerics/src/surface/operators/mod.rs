@@ -177,7 +177,7 @@ fn operator_matrix(
                 row,
             });
         }
-        Ok(())
+        Ok::<_, NumericsError>(())
     })?;
     observer.enter(Stage::Solve);
     for rows in matrix.chunks_mut(n * ROWS_PER_SOLVE) {

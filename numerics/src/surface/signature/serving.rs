@@ -9,7 +9,7 @@ use super::confirmation::Unconfirmed;
 use super::deviations::deviations;
 use super::doubt::{is_doubtful, uncertain};
 use super::offset::{OffsetJet, offset_jet_at};
-use crate::error::Result;
+use crate::error::{NumericsError, Result};
 use crate::machine::small::Small;
 use crate::machine::vector::norm;
 use crate::observer::{Observer, Stage};
@@ -158,7 +158,7 @@ impl Service<'_> {
                     (false, _) => self.by_signature(&site, &mut slot),
                 };
                 verdict.reason = verdict.reason.or_else(|| self.flag(*verdict, &slot, &site));
-                Ok(())
+                Ok::<_, NumericsError>(())
             },
         )?;
         let levels = self.jets.values();

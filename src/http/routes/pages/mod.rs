@@ -13,8 +13,8 @@ use axum::extract::Path;
 use axum::response::Html;
 
 use crate::http::openapi::responses::{PageProblems, ProbeProblems};
-use crate::http::problem::Problem;
-use crate::http::problem::slug::Slug;
+use crate::http::problem::catalogue;
+use crate::http::problem::{self, Problem};
 
 /// List the problems
 ///
@@ -27,7 +27,7 @@ use crate::http::problem::slug::Slug;
 )]
 pub async fn list_problem_pages() -> Html<String> {
     let mut body = String::from("<dl>\n");
-    for slug in Slug::ALL {
+    for slug in problem::all() {
         let (name, status, title) = (slug.as_str(), slug.status().as_u16(), slug.title());
         let _ = writeln!(body, "<dt><a href=\"problems/{name}\">{name}</a> ({status})</dt><dd>{title}</dd>");
     }
@@ -45,7 +45,8 @@ pub async fn list_problem_pages() -> Html<String> {
     responses((status = 200, description = "The explanation", body = String, content_type = "text/html"), PageProblems)
 )]
 pub async fn get_problem_page(Path(slug): Path<String>) -> Result<Html<String>, Problem> {
-    let slug = Slug::parse(&slug).ok_or_else(|| Problem::new(Slug::NotFound, "no such problem type"))?;
+    let slug =
+        problem::named(&slug).ok_or_else(|| Problem::new(catalogue::NOT_FOUND, "no such problem type"))?;
     let (name, status, explanation) = (slug.as_str(), slug.status(), slug.explanation());
     let body = format!("<p><code>{name}</code>, HTTP status {status}</p>\n<p>{explanation}</p>");
     Ok(page(slug.title(), &body))

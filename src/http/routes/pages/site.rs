@@ -7,10 +7,10 @@ use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 
 use crate::http::problem::Problem;
-use crate::http::problem::slug::Slug;
-use crate::http::wire::compression::Compressor;
-use crate::http::wire::etag::is_known;
-use crate::http::wire::negotiation::{Coding, accepted_text_coding};
+use crate::http::problem::catalogue;
+use gramian_host::wire::compression::Compressor;
+use gramian_host::wire::etag::is_known;
+use gramian_host::wire::negotiation::{Coding, accepted_text_coding};
 
 pub const HTML: &str = "text/html; charset=utf-8";
 pub const SCRIPT: &str = "text/javascript; charset=utf-8";
@@ -60,7 +60,7 @@ impl Site {
     /// Returns 404 if the folder has no such file.
     pub fn answer(&self, path: &str, headers: &HeaderMap) -> Result<Response, Problem> {
         let packed = self.packed.iter().find(|packed| packed.file.path == path);
-        let packed = packed.ok_or_else(|| Problem::new(Slug::NotFound, "the page has no such file"))?;
+        let packed = packed.ok_or_else(|| Problem::new(catalogue::NOT_FOUND, "the page has no such file"))?;
         Ok(packed.answer(headers, self.policy))
     }
 }

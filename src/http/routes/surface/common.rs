@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use crate::http::fields::{Fit, GeometryInclude, OrientationChoice, SurfaceChoice};
 use crate::http::problem::Problem;
-use crate::http::problem::slug::Slug;
+use crate::http::problem::catalogue;
 use crate::http::serve::operation::Plan;
 use crate::http::serve::plan::{Cost, PlannedSurface};
 use crate::http::serve::planner::Planner;
-use crate::http::wire::read::points::Points;
+use gramian_host::wire::read::points::Points;
 use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::machine::price::Sizes;
 use gramian_numerics::model::price::geometry_price;
@@ -91,5 +91,5 @@ pub fn check_is_surface(cloud: &Cloud) -> Result<(), Problem> {
         return Ok(());
     }
     let detail = "the geometry of a hypersurface needs points of dimension 2 or more, found 1";
-    Err(Problem::of_field(Slug::InvalidCloud, "/cloud/points", detail))
+    Err(Problem::of_field(catalogue::INVALID_CLOUD, "/cloud/points", detail))
 }

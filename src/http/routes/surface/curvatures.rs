@@ -1,20 +1,21 @@
 //! `POST /v1/curvatures`: curvatures of the surface that a cloud samples.
 
 use super::common::{GeometryWork, geometry_request, plan_geometry};
-use crate::http::compute::JobObserver;
 use crate::http::fields::{
     Degenerate, Diagnostics, GeometryInclude, OrientationChoice, SurfaceChoice, SurfaceUsed, request,
 };
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
+use crate::http::serve::answers::place::shape_of_points;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::planner::Planner;
-use crate::http::wire::negotiation::Format;
-use crate::http::wire::read::points::Points;
-use crate::http::wire::write::answer::answer;
-use crate::http::wire::write::array::Array;
-use crate::http::wire::write::model::Shape;
+use gramian_host::answer;
+use gramian_host::compute::JobObserver;
+use gramian_host::wire::negotiation::Format;
+use gramian_host::wire::read::points::Points;
+use gramian_host::wire::write::array::Array;
+use gramian_host::wire::write::model::Shape;
 use gramian_numerics::kernel::defaults::Purpose;
 
 request! {
@@ -130,7 +131,7 @@ impl Operation for CurvaturesRequest {
             mean_curvature_deviations: mean,
             gaussian_curvature_deviations: gaussian,
             diagnostics: surface.diagnostics(fits),
-            shape: Shape::of_points(work.queries),
+            shape: shape_of_points(work.queries),
         })
     }
 }

@@ -1,10 +1,10 @@
 //! Flags for doubtful answers of operators on values.
 
-use crate::http::compute::JobObserver;
 use crate::http::fields::Degenerate;
 use crate::http::problem::Problem;
 use crate::http::serve::answers::surface::SurfaceGeometry;
 use crate::http::serve::fitted::Fits;
+use gramian_host::compute::JobObserver;
 use gramian_numerics::surface::operators::{Judged, Operator};
 
 /// Answers of an operator that may be doubtful.

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use super::common::{asked_of, check_is_surface, geometry_request};
 use super::doubts::{Doubted, degenerate};
-use crate::http::compute::JobObserver;
 use crate::http::fields::{
     Degenerate, Diagnostics, Fit, Geometry, OrientationChoice, StencilsUsed, ValuesInclude,
 };
@@ -14,10 +13,11 @@ use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::Plan;
 use crate::http::serve::plan::{Cost, Values};
 use crate::http::serve::planner::{GivenValues, OperatorFits, Planner};
-use crate::http::wire::read::points::Points;
-use crate::http::wire::write::array::Array;
-use crate::http::wire::write::integers::Integers;
 use crate::store::clouds::RegisteredCloud;
+use gramian_host::compute::JobObserver;
+use gramian_host::wire::read::points::Points;
+use gramian_host::wire::write::array::Array;
+use gramian_host::wire::write::integers::Integers;
 use gramian_numerics::function::local_kriging::LocalKriging;
 use gramian_numerics::machine::price::Sizes;
 use gramian_numerics::model::Report;

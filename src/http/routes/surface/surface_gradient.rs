@@ -4,18 +4,18 @@
 use super::operator::{
     Applied, AppliedAnswer, AppliedWork, MatrixAnswer, MatrixWork, SparseAnswer, StencilWork,
 };
-use crate::http::compute::JobObserver;
 use crate::http::fields::{Degenerate, Diagnostics, Fit, Geometry, MeanChoice, ValuesInclude, request};
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::planner::{Planner, ValuesUse};
-use crate::http::wire::negotiation::Format;
-use crate::http::wire::read::points::Points;
-use crate::http::wire::write::answer::answer;
-use crate::http::wire::write::array::Array;
-use crate::http::wire::write::integers::Integers;
+use gramian_host::answer;
+use gramian_host::compute::JobObserver;
+use gramian_host::wire::negotiation::Format;
+use gramian_host::wire::read::points::Points;
+use gramian_host::wire::write::array::Array;
+use gramian_host::wire::write::integers::Integers;
 use gramian_numerics::surface::operators::Operator;
 
 const OPERATOR: Operator = Operator::SurfaceGradient;

@@ -8,15 +8,15 @@ use axum::response::Response;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::http::compute::JobObserver;
 use crate::http::fields::KernelUsed;
 use crate::http::openapi::responses::ComputeProblems;
-use crate::http::problem::{Pointers, Problem};
+use crate::http::problem::{Pointers, Problem, from_numerics};
 use crate::http::serve::direct::{DirectOperation, serve};
 use crate::http::serve::planner::Planner;
 use crate::http::state::app::App;
-use crate::http::wire::read::points::Points;
-use crate::store::Owner;
+use gramian_host::compute::JobObserver;
+use gramian_host::memory::Owner;
+use gramian_host::wire::read::points::Points;
 use gramian_numerics::machine::price::Price;
 use gramian_numerics::sums::regularization::Regularization;
 use gramian_numerics::surface::local::coarse::CoarseCloud;
@@ -85,8 +85,7 @@ impl DirectOperation for CoarseRequest {
             return Err(Problem::invalid_request("/count", "must be 1 or more"));
         }
         let cloud = planner.unregistered(self.points, "/points")?;
-        let refuse =
-            |error| Problem::from_numerics(error, Pointers { points: "/points", ..Pointers::REQUEST });
+        let refuse = |error| from_numerics(error, Pointers { points: "/points", ..Pointers::REQUEST });
         let coarse = CoarseCloud::of(&cloud, self.count, noise, observer).map_err(refuse)?;
         if Regularization::uniform(coarse.alpha).is_err() {
             let detail = "is too large beside the spacing of the points: alpha exceeds 1e300";

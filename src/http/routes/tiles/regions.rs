@@ -3,17 +3,17 @@
 use std::sync::Arc;
 
 use super::fields::{Border, Region};
-use crate::http::compute::JobObserver;
 use crate::http::fields::{Diagnostics, request};
 use crate::http::problem::Problem;
-use crate::http::problem::slug::Slug;
+use crate::http::problem::catalogue;
 use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::plan::Cost;
 use crate::http::serve::planner::Planner;
-use crate::http::wire::write::answer::answer;
-use crate::http::wire::write::integers::Integers;
+use gramian_host::answer;
+use gramian_host::compute::JobObserver;
+use gramian_host::wire::write::integers::Integers;
 use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::model::Report;
 use gramian_numerics::points::cloud::Cloud;
@@ -79,7 +79,7 @@ impl Operation for RegionsRequest {
         let (n, d) = (main.on.n_points(), main.on.stored.cloud.dimension());
         let Some(directions) = main.on.stored.normals.clone() else {
             let detail = "the cloud of a tile needs normals: its outward directions";
-            return Err(Problem::of_field(Slug::InvalidRequest, "/cloud/normals", detail));
+            return Err(Problem::of_field(catalogue::INVALID_REQUEST, "/cloud/normals", detail));
         };
         let coarse = self.coarse.unwrap_or_default();
         check_points(&self.own, n, "/own")?;

@@ -9,13 +9,13 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::fields::{Border, Region};
-use crate::http::compute::JobObserver;
 use crate::http::openapi::responses::ComputeProblems;
-use crate::http::problem::{Pointers, Problem};
+use crate::http::problem::{Pointers, Problem, from_numerics};
 use crate::http::serve::direct::{DirectOperation, serve};
 use crate::http::serve::planner::Planner;
 use crate::http::state::app::App;
-use crate::store::Owner;
+use gramian_host::compute::JobObserver;
+use gramian_host::memory::Owner;
 use gramian_numerics::machine::price::Price;
 use gramian_numerics::surface::tiles::{self, Tiling, TilingSize};
 
@@ -98,7 +98,7 @@ impl DirectOperation for SidesRequest {
 
     fn compute(self, _: &Planner<'_>, observer: &JobObserver) -> Result<SidesResponse, Problem> {
         let tiles: Vec<tiles::TileRegions> = self.tiles.into_iter().map(TileRegions::into).collect();
-        let refuse = |error| Problem::from_numerics(error, Pointers::REQUEST);
+        let refuse = |error| from_numerics(error, Pointers::REQUEST);
         let links: Vec<[usize; 2]> = self.links.iter().map(|link| [link.first, link.second]).collect();
         let tiling = Tiling::of(&tiles, &links, observer).map_err(refuse)?;
         let sides = tiling.sides(observer).map_err(refuse)?;

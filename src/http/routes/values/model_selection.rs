@@ -5,18 +5,18 @@ mod search;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::http::compute::JobObserver;
 use crate::http::fields::{Diagnostics, DuplicatePolicy, Fit, KernelFamily, KernelUsed, MeanChoice, request};
 use crate::http::problem::Problem;
-use crate::http::problem::slug::Slug;
+use crate::http::problem::catalogue;
 use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::plan::Cost;
 use crate::http::serve::planner::{GivenValues, Planner, Restricted};
-use crate::http::wire::write::answer::{answer, json_members};
-use crate::http::wire::write::array::Array;
-use crate::http::wire::write::json::Nullable;
+use gramian_host::compute::JobObserver;
+use gramian_host::wire::write::array::Array;
+use gramian_host::wire::write::json::Nullable;
+use gramian_host::{answer, json_members};
 use gramian_numerics::error::SolverKind;
 use search::{Search, Work};
 
@@ -222,8 +222,12 @@ impl Operation for ModelSelectionRequest {
         planner.queries(None, &mut main.on)?;
         let (n, d) = (main.on.n_points(), main.on.stored.cloud.dimension());
         if n > MAX_POINTS {
-            let problem =
-                Problem::too_large(Slug::ProblemTooLarge, "points in a model selection", MAX_POINTS, Some(n));
+            let problem = Problem::too_large(
+                catalogue::PROBLEM_TOO_LARGE,
+                "points in a model selection",
+                MAX_POINTS,
+                Some(n),
+            );
             let remedy =
                 "select on a sample of the points, then send the selected parameters with all of them";
             return Err(problem.at(main.on.pointers.points).with_remedy(remedy));

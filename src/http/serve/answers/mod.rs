@@ -1,5 +1,6 @@
 //! Parts of answers that many operations share: values and surfaces at the queries, and diagnostics.
 
 mod diagnostics;
+pub mod place;
 pub mod surface;
 pub mod values;

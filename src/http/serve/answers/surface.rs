@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use crate::http::compute::JobObserver;
 use crate::http::fields::{
     Degenerate, DegenerateReason, Diagnostics, StencilsUsed, SurfaceUsed, Warning, WarningCode,
 };
 use crate::http::problem::Problem;
 use crate::http::serve::fitted::Fits;
-use crate::http::wire::write::array::Array;
+use gramian_host::compute::JobObserver;
+use gramian_host::wire::write::array::Array;
 use gramian_numerics::error::NumericsError;
 use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::kernel::Family;

@@ -1,11 +1,11 @@
 //! Values at queries, with the diagnostics of their answer.
 
-use crate::http::compute::JobObserver;
 use crate::http::fields::Diagnostics;
 use crate::http::problem::Problem;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::plan::Values;
-use crate::http::wire::write::array::Array;
+use gramian_host::compute::JobObserver;
+use gramian_host::wire::write::array::Array;
 use gramian_numerics::function::batch::Batch;
 use gramian_numerics::model::{EachAt, JetRequest, ValuesAt};
 use gramian_numerics::solver::trend::Trend;

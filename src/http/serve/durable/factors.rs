@@ -7,13 +7,13 @@ use std::sync::atomic::Ordering;
 
 use bytes::Bytes;
 
-use crate::http::compute::Admission;
 use crate::http::serve::plan::FitPlan;
 use crate::http::state::app::App;
 use crate::store::objects::factors::{FactorHead, FactorName, FoundFactor};
-use crate::store::objects::pieces::HASH_BYTES;
-use crate::store::objects::{Damaged, Unavailable};
 use crate::store::prepared::PreparedFit;
+use gramian_host::compute::Admission;
+use gramian_host::store::pieces::HASH_BYTES;
+use gramian_host::store::{Damaged, Unavailable};
 use gramian_numerics::model::Model;
 use gramian_numerics::solver::{FactorBuilder, Solver, System};
 

@@ -8,22 +8,19 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, SystemTime};
 
 use bytes::Bytes;
-use tracing::Instrument;
 
 use crate::http::problem::Problem;
-use crate::http::problem::slug::Slug;
+use crate::http::problem::catalogue;
 use crate::http::state::app::App;
 use crate::http::state::durable::Durable;
-use crate::store::Owner;
-use crate::store::budget::Reservation;
 use crate::store::clouds::{CloudPage, Holder, Kept, Recalled, RegisteredCloud};
 use crate::store::key::CloudId;
 use crate::store::objects::cloud_object::{decode, encode, object_bytes};
-use crate::store::objects::{ListWindow, OwnerName, Swept, Unavailable};
-
-/// Seconds after which a client should retry if the store does not answer. Refused clouds are offered to the
-/// store again at the same interval.
-pub const SECONDS_UNTIL_BACK: u64 = 5;
+use crate::store::objects::{ListWindow, Swept};
+use gramian_host::memory::Owner;
+use gramian_host::memory::budget::Reservation;
+use gramian_host::store::changes::{SECONDS_UNTIL_BACK, to_its_end, unavailable};
+use gramian_host::store::{OwnerName, Unavailable};
 
 /// Interval between sweeps of the store, unless it grows beyond its limit earlier.
 const SWEEPING: Duration = Duration::from_secs(600);
@@ -43,22 +40,8 @@ const PATIENCE: Duration = Duration::from_secs(1);
 /// Flops for hashing and copying one byte.
 const FLOPS_PER_BYTE: f64 = 8.0;
 
-/// Returns 503 for a store that does not answer.
-pub fn unavailable(error: &Unavailable) -> Problem {
-    tracing::error!(%error, "the store does not answer");
-    Problem::unavailable("the store of clouds does not answer", SECONDS_UNTIL_BACK)
-}
-
 fn holder_of(app: &App, owner: Owner) -> Holder {
     Holder { owner, name: app.keys.name_of(owner) }
-}
-
-/// Runs a change of the store to its end, even if the client leaves meanwhile. Nobody asked for half a
-/// change.
-pub async fn to_its_end<T: Send + 'static>(
-    change: impl Future<Output = Result<T, Problem>> + Send + 'static,
-) -> Result<T, Problem> {
-    tokio::spawn(change.in_current_span()).await.unwrap_or_else(|_| Err(Problem::internal()))
 }
 
 /// Returns a cloud of an owner, from memory or from the store. A read takes no place among computations: the
@@ -192,7 +175,7 @@ fn check_readable(app: &App, cloud: &RegisteredCloud) -> Result<(), Problem> {
     }
     let what = "bytes of a cloud, 8 for a coordinate,";
     let remedy = "register it in parts, or raise the memory of the service";
-    Err(Problem::too_large(Slug::ProblemTooLarge, what, most, n_bytes).with_remedy(remedy))
+    Err(Problem::too_large(catalogue::PROBLEM_TOO_LARGE, what, most, n_bytes).with_remedy(remedy))
 }
 
 /// Returns the first clouds within a window of an owner's list.
@@ -203,7 +186,7 @@ pub async fn list_clouds(app: &Arc<App>, owner: Owner, window: ListWindow) -> Re
     let shared = app.clone();
     // This computes nothing, but takes longer than an async worker may be held.
     let unstored = app.compute.run_small(owner, move || shared.clouds.unstored_places(owner)).await?;
-    let objects = app.durable.as_ref().map(|durable| &*durable.objects);
+    let objects = app.durable.as_ref().map(|durable| &durable.objects);
     let page = app.clouds.page(objects, &holder_of(app, owner), window, unstored).await;
     page.map_err(|error| unavailable(&error))
 }
@@ -215,7 +198,7 @@ pub async fn list_clouds(app: &Arc<App>, owner: Owner, window: ListWindow) -> Re
 pub async fn forget_cloud(app: &Arc<App>, owner: Owner, id: CloudId) -> Result<bool, Problem> {
     let app = app.clone();
     to_its_end(async move {
-        let objects = app.durable.as_ref().map(|durable| &*durable.objects);
+        let objects = app.durable.as_ref().map(|durable| &durable.objects);
         let was_there = app.clouds.forget(objects, &holder_of(&app, owner), id).await;
         let was_there = was_there.map_err(|error| unavailable(&error))?;
         forget_results(&app, owner, id);
@@ -241,7 +224,7 @@ pub async fn retain(app: Arc<App>) {
         }
         let now = SystemTime::now();
         let knows = |name: &OwnerName| app.keys.owner_named(name).is_some();
-        let (kept, longest) = app.config.job_retention();
+        let (kept, longest) = app.settings.job_retention();
         if let Err(error) = durable.objects.sweep_jobs(knows, kept, longest, now).await {
             tracing::error!(%error, "jobs of removed keys could not be deleted");
         }

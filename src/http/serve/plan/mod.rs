@@ -9,9 +9,9 @@ use std::sync::Arc;
 
 use crate::http::fields::DuplicatePolicy;
 use crate::http::problem::{Pointers, Problem};
-use crate::store::Owner;
 use crate::store::clouds::RegisteredCloud;
 pub use fits::{FitPlans, PlannedFits};
+use gramian_host::memory::Owner;
 use gramian_numerics::machine::price::Price;
 use gramian_numerics::model::choose::AutoReason;
 use gramian_numerics::observer::Observer;

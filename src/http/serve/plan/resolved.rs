@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::{FittedCloud, Values};
 use crate::http::fields::DuplicatePolicy;
-use crate::http::problem::{Pointers, Problem};
+use crate::http::problem::{Pointers, Problem, from_numerics};
 use crate::http::state::app::FitFailure;
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::FitKey;
@@ -78,12 +78,12 @@ impl FitPlan {
             None => false,
             Some((kernel, regularization)) => {
                 let is_checked = kernel.check_dimension(stored.cloud.dimension());
-                is_checked.map_err(|error| Problem::from_numerics(error, pointers))?;
+                is_checked.map_err(|error| from_numerics(error, pointers))?;
                 *regularization == Regularization::Uniform(0.0)
             }
         };
         let merges = duplicates == DuplicatePolicy::Merge && is_singular_at_duplicates;
-        let refused = |error| Problem::from_numerics(error, pointers);
+        let refused = |error| from_numerics(error, pointers);
         let merged =
             if merges { Merge::duplicates_of(&stored.cloud, observer).map_err(refused)? } else { None };
         let key = FitKey::of(owner, stored.id, &recipe, merged.is_some());
@@ -159,7 +159,7 @@ impl FitPlan {
         if let NotPositiveDefinite { minimum_alpha, .. } = &mut error {
             *minimum_alpha *= self.process.scale;
         }
-        Problem::from_numerics(error, self.pointers)
+        from_numerics(error, self.pointers)
     }
 
     /// Converts the failure of a fit, with pointers into this request.

@@ -3,7 +3,7 @@
 use super::resolved::{ChosenRecipe, Process};
 use super::{FitPlan, FittedCloud, Lack};
 use crate::http::fields::kernel::PlannedKernel;
-use crate::http::problem::Problem;
+use crate::http::problem::{Problem, from_numerics};
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::defaults::{Purpose, default_fit};
 use gramian_numerics::model::choose::AutoReason;
@@ -52,7 +52,7 @@ impl PlannedSurface {
 
     pub(super) fn resolve(self, observer: &dyn Observer) -> Result<FitPlan, Problem> {
         let Self { on, choice } = self;
-        let refuse = |error| Problem::from_numerics(error, on.pointers);
+        let refuse = |error| from_numerics(error, on.pointers);
         let (solver, kernel, regularization, purpose) = match choice {
             SurfaceSource::Signature { solver, kernel, regularization, purpose } => {
                 (solver, kernel, regularization, purpose)

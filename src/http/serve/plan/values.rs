@@ -6,7 +6,7 @@ use super::resolved::{ChosenRecipe, Process};
 
 use super::{FitPlan, FittedCloud, Lack};
 use crate::http::fields::kernel::PlannedKernel;
-use crate::http::problem::Problem;
+use crate::http::problem::{Problem, from_numerics};
 use crate::store::key::ValuesKey;
 use crate::store::learned::LearnedKey;
 use gramian_numerics::error::{NumericsError, SolverKind};
@@ -113,7 +113,7 @@ impl PlannedValues {
 
     pub(super) fn resolve(self, observer: &dyn Observer) -> Result<FitPlan, Problem> {
         let Self { on, solver, reason, mean, values, learned, .. } = self;
-        let refuse = |error| Problem::from_numerics(error, on.pointers);
+        let refuse = |error| from_numerics(error, on.pointers);
         let is_learned = self.kernel.is_none() && learned.is_some();
         let scaled = match (&self.kernel, &learned) {
             (Some(kernel), _) => {

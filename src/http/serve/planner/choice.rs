@@ -2,10 +2,10 @@
 
 use super::inputs::length_mismatch;
 use crate::http::fields::{CloudRef, Fit, Geometry, Hyperparameters, Kernel, SolverChoice};
-use crate::http::problem::slug::Slug;
 use crate::http::problem::{Pointers, Problem};
+use crate::http::problem::{catalogue, from_numerics};
 use crate::http::serve::plan::FittedCloud;
-use crate::http::wire::read::points::Points;
+use gramian_host::wire::read::points::Points;
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::solver::trend::Mean;
 use gramian_numerics::solver::{DEFAULT_TOLERANCE, TOLERANCES};
@@ -30,7 +30,7 @@ impl Restricted {
         };
         let name = self.name;
         let detail = format!("{why}, so it has no {name}; leave it out, or set \"solver\": \"dense\"");
-        Problem::of_field(Slug::UnsupportedBySolver, self.pointer, detail)
+        Problem::of_field(catalogue::UNSUPPORTED_BY_SOLVER, self.pointer, detail)
     }
 
     pub(super) fn remedy(self) -> String {
@@ -46,14 +46,14 @@ pub(super) fn local_lacks_operators(pointer: &str) -> Problem {
     let detail = "a dense matrix needs one function of all values, which the local solver does not have: set \"solver\": \
                   \"dense\", with \"geometry\": {\"surface\": \"local\"} for a local surface, or ask for the sparse matrix at \
                   /v1/laplace-beltrami/sparse-matrix or /v1/surface-gradient/sparse-matrix";
-    Problem::of_field(Slug::UnsupportedBySolver, pointer, detail)
+    Problem::of_field(catalogue::UNSUPPORTED_BY_SOLVER, pointer, detail)
 }
 
 /// Returns 422 for what only local regressions have, at the surface of another solver.
 pub(super) fn only_local_learns(member: &str) -> Problem {
     let detail =
         format!("only local regressions take {member}: leave them out, or set \"solver\": \"local\"");
-    Problem::of_field(Slug::UnsupportedBySolver, format!("/{member}"), detail)
+    Problem::of_field(catalogue::UNSUPPORTED_BY_SOLVER, format!("/{member}"), detail)
 }
 
 /// Returns the tolerance of a request.
@@ -142,7 +142,7 @@ impl FitOptions {
 
     /// Returns the given regularization. `None` leaves the choice to the service.
     pub(super) fn regularization(self, on: &FittedCloud) -> Result<Option<Regularization>, Problem> {
-        let refuse = |error| Problem::from_numerics(error, on.pointers);
+        let refuse = |error| from_numerics(error, on.pointers);
         match (self.alpha, self.noise_variances) {
             (Some(_), Some(_)) => {
                 let detail = "alpha and noise_variances exclude each other; give one of them";

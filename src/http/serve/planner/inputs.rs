@@ -5,14 +5,14 @@ use std::sync::Arc;
 
 use super::Planner;
 use crate::http::fields::CloudRef;
-use crate::http::problem::Problem;
-use crate::http::problem::slug::Slug;
+use crate::http::fields::limits::{too_many_coordinates, too_many_points, too_many_queries, transposed};
+use crate::http::problem::{self, Problem, catalogue};
 use crate::http::serve::durable::TRUST;
 use crate::http::serve::plan::FittedCloud;
-use crate::http::wire::read::limits::{too_many_coordinates, too_many_points, too_many_queries, transposed};
-use crate::http::wire::read::points::{Points, ValueLists};
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::CloudId;
+use gramian_host::problem::slug::Slug;
+use gramian_host::wire::read::points::{Points, ValueLists};
 use gramian_numerics::error::NumericsError;
 use gramian_numerics::points::cloud::Cloud;
 
@@ -31,7 +31,7 @@ impl Planner<'_> {
             of.pointers.queries = of.pointers.points;
             return Ok(of.stored.cloud.clone());
         };
-        let queries = rectangular(points, "/queries", Slug::InvalidRequest)?;
+        let queries = rectangular(points, "/queries", catalogue::INVALID_REQUEST)?;
         let (limit, required) = (self.app.config.max_queries, queries.n_points());
         if required > limit {
             return Err(too_many_queries(limit, required).at("/queries"));
@@ -48,7 +48,7 @@ impl Planner<'_> {
     /// # Errors
     /// 422 for sites that are no list of points of the cloud.
     pub(super) fn sites(&self, sites: Points, cloud: &Cloud) -> Result<Arc<Cloud>, Problem> {
-        let sites = rectangular(sites, "/sites", Slug::InvalidRequest)?;
+        let sites = rectangular(sites, "/sites", catalogue::INVALID_REQUEST)?;
         if cloud.dimension() != sites.dimension() {
             return Err(dimension_mismatch("/sites", cloud.dimension(), &sites));
         }
@@ -78,7 +78,7 @@ impl Planner<'_> {
         if let Some(n_numbers) = n_numbers.filter(|_| required <= limit) {
             return Ok(n_numbers);
         }
-        Err(Problem::too_large(Slug::ProblemTooLarge, "bytes of answer", limit, Some(required)).with_remedy(
+        Err(Problem::too_large(catalogue::PROBLEM_TOO_LARGE, "bytes of answer", limit, Some(required)).with_remedy(
             "split the queries over several requests, or ask for fewer members: the cached factorization serves all of them \
              (operators raise the limit by GRAMIAN_MAX_RESPONSE_BYTES)",
         ))
@@ -113,7 +113,7 @@ impl Planner<'_> {
     /// # Errors
     /// 413 beyond the limits, 422 for an invalid cloud.
     pub fn unregistered(&self, points: Points, pointer: &str) -> Result<Cloud, Problem> {
-        let cloud = rectangular(points, pointer, Slug::InvalidCloud)?;
+        let cloud = rectangular(points, pointer, catalogue::INVALID_CLOUD)?;
         let (limit, required) = (self.app.config.max_points, cloud.n_points());
         if required > limit {
             return Err(too_many_points(limit, required).at(pointer));
@@ -170,7 +170,7 @@ fn first_elsewhere(sites: &Cloud, cloud: &Cloud) -> Option<usize> {
 /// Returns 404 for an id that names no cloud of this owner.
 pub fn unknown_cloud(id: &str) -> Problem {
     let shown: String = id.chars().take(64).collect();
-    Problem::new(Slug::UnknownCloud, format!("no cloud {shown:?} is registered; post its points again"))
+    Problem::new(catalogue::UNKNOWN_CLOUD, format!("no cloud {shown:?} is registered; post its points again"))
 }
 
 /// Largest seed. JSON clients represent all whole numbers up to it.
@@ -207,7 +207,7 @@ impl GivenValues {
 /// 422 without any list, and for a list of another length than the first.
 pub fn value_lists(ValueLists(lists): ValueLists) -> Result<GivenValues, Problem> {
     if let Some((row, found)) = lists.ragged {
-        return Err(Problem::length_mismatch(format!("/values/{row}"), lists.dimension, found));
+        return Err(problem::length_mismatch(format!("/values/{row}"), lists.dimension, found));
     }
     match lists.n_rows {
         0 => Err(Problem::invalid_request("/values", "at least one list of values is needed")),
@@ -239,7 +239,7 @@ fn rectangular(points: Points, pointer: &str, slug: Slug) -> Result<Cloud, Probl
 
 /// Returns 422 for rows of another dimension than the cloud, with a hint if the transpose would fit.
 fn dimension_mismatch(pointer: &str, expected: usize, found: &Cloud) -> Problem {
-    let problem = Problem::dimension_mismatch(pointer, expected, found.dimension());
+    let problem = problem::dimension_mismatch(pointer, expected, found.dimension());
     if found.n_points() != expected {
         return problem;
     }
@@ -249,7 +249,7 @@ fn dimension_mismatch(pointer: &str, expected: usize, found: &Cloud) -> Problem 
 /// Returns 422 for entries that are not one per point of the cloud, with a hint if they are one per column.
 pub(super) fn length_mismatch(pointer: &str, cloud: &Cloud, found: usize) -> Problem {
     let (n_points, dimension) = (cloud.n_points(), cloud.dimension());
-    let problem = Problem::length_mismatch(pointer, n_points, found);
+    let problem = problem::length_mismatch(pointer, n_points, found);
     if found != dimension {
         return problem;
     }
@@ -258,10 +258,10 @@ pub(super) fn length_mismatch(pointer: &str, cloud: &Cloud, found: usize) -> Pro
 
 /// Checks that there is one normal per point, of its dimension and not zero.
 fn check_normals(normals: Points, cloud: &Cloud, pointer: &str) -> Result<Cloud, Problem> {
-    let normals = rectangular(normals, pointer, Slug::InvalidCloud)?;
+    let normals = rectangular(normals, pointer, catalogue::INVALID_CLOUD)?;
     let is_transposed = normals.n_points() == cloud.dimension() && normals.dimension() == cloud.n_points();
     if normals.n_points() != cloud.n_points() && !is_transposed {
-        return Err(Problem::length_mismatch(pointer, cloud.n_points(), normals.n_points()));
+        return Err(problem::length_mismatch(pointer, cloud.n_points(), normals.n_points()));
     }
     if normals.dimension() != cloud.dimension() {
         return Err(dimension_mismatch(pointer, cloud.dimension(), &normals));
@@ -271,7 +271,7 @@ fn check_normals(normals: Points, cloud: &Cloud, pointer: &str) -> Result<Cloud,
         None => Ok(normals),
         Some(row) => {
             let detail = format!("normal {row} is zero");
-            Err(Problem::of_field(Slug::InvalidCloud, format!("{pointer}/{row}"), detail).with_remedy(
+            Err(Problem::of_field(catalogue::INVALID_CLOUD, format!("{pointer}/{row}"), detail).with_remedy(
                 "leave out this point, or leave out all normals and they are estimated from the points",
             ))
         }

@@ -6,7 +6,7 @@ use super::Planner;
 use super::choice::{FitOptions, pointers_of};
 use crate::http::fields::kernel::PlannedKernel;
 use crate::http::fields::{CloudRef, DuplicatePolicy, HasCloud, SolverChoice};
-use crate::http::problem::Problem;
+use crate::http::problem::{Problem, from_numerics};
 use crate::http::serve::plan::FittedCloud;
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::{CloudId, process_key};
@@ -89,9 +89,7 @@ impl Planner<'_> {
         else {
             return Ok(None);
         };
-        kernel
-            .check_dimension(stored.cloud.dimension())
-            .map_err(|error| Problem::from_numerics(error, pointers))?;
+        kernel.check_dimension(stored.cloud.dimension()).map_err(|error| from_numerics(error, pointers))?;
         let options = FitOptions {
             alpha: process.alpha,
             noise_variances: process.noise_variances.cloned(),

@@ -9,12 +9,11 @@ use std::sync::Arc;
 
 use super::plan::{FittedCloud, PlannedSurface, PlannedValues, SurfaceSource, Values};
 use crate::http::fields::kernel::PlannedKernel;
+use crate::http::fields::limits::too_many_dense_points;
 use crate::http::fields::{Fit, Geometry, SolverChoice};
-use crate::http::problem::Problem;
-use crate::http::problem::slug::Slug;
+use crate::http::problem::catalogue;
+use crate::http::problem::{Problem, dimension_mismatch};
 use crate::http::state::app::App;
-use crate::http::wire::read::limits::too_many_dense_points;
-use crate::store::Owner;
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::{CloudId, GivenKernel, ValuesKey};
 pub use choice::Restricted;
@@ -22,6 +21,7 @@ use choice::{
     FitOptions, TRY_LOCAL, checked_tolerance, local_lacks_operators, only_local_learns, pointers_of,
     pointers_of_surface,
 };
+use gramian_host::memory::Owner;
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::model::choose::{AutoReason, UnfittedSurface, prefers_local};
@@ -175,12 +175,12 @@ impl<'a> Planner<'a> {
                 let detail = format!(
                     "local regressions serve surfaces in dimensions 2 to {MAX_LOCAL_DIMENSION}, the cloud has {dimension}"
                 );
-                return Err(Problem::of_field(Slug::UnsupportedBySolver, pointer, detail));
+                return Err(Problem::of_field(catalogue::UNSUPPORTED_BY_SOLVER, pointer, detail));
             }
             if let Some(pointer) = given {
                 let detail = "local regressions choose kernel and noise by their likelihood; leave this out, or take \
                               \"surface\": \"signature\"";
-                return Err(Problem::of_field(Slug::UnsupportedBySolver, pointer, detail));
+                return Err(Problem::of_field(catalogue::UNSUPPORTED_BY_SOLVER, pointer, detail));
             }
             return Ok(Regressed::Locally(None));
         }
@@ -299,7 +299,7 @@ impl<'a> Planner<'a> {
         };
         let (expected, found) = (values.stored.cloud.dimension(), stored.cloud.dimension());
         if expected != found {
-            return Err(Problem::dimension_mismatch("/geometry/cloud", expected, found));
+            return Err(dimension_mismatch("/geometry/cloud", expected, found));
         }
         let inherits_noise = geometry.alpha.is_none() && geometry.noise_variances.is_none();
         if inherits_noise && options.noise_variances.is_some() && stored.id != values.stored.id {

@@ -1,17 +1,16 @@
 //! The cost of a request, from its plan.
 
 use std::sync::Arc;
-use std::time::Instant;
 
-use super::received::Received;
-use super::{Call, Step};
-use crate::http::compute::Admission;
+use super::parsed::Parsed;
+use super::{OnCall, Step};
 use crate::http::problem::Problem;
 use crate::http::serve::durable::keep_all;
-use crate::http::serve::fitting::Outlook;
-use crate::http::serve::intake::ReceivedBody;
 use crate::http::serve::operation::AnyOperation;
 use crate::http::state::app::App;
+use gramian_host::compute::{Admission, JobObserver};
+use gramian_host::operation::intake::ReceivedBody;
+use gramian_host::operation::{self, Outlook};
 use gramian_numerics::error::SolverKind;
 
 /// Estimated needs of a request.
@@ -37,25 +36,31 @@ pub async fn estimate(
     operation: AnyOperation,
 ) -> Result<Estimate, Problem> {
     let AnyOperation { name, parse_named, .. } = operation;
-    let call = Call { app, admission, operation: name, wanted: None, began: Instant::now() };
-    let mut step = Received { body, parse: parse_named }.parse(&call).await?;
+    let on = OnCall { call: operation::unanswered(app.host.clone(), admission, name), app };
+    let flops = body.body.flops_to_parse();
+    let parse = move |on: &OnCall, observer: &JobObserver| {
+        let (body, memory) = body.unpack(&on.app, observer)?;
+        let request = parse_named(&body, &on.app.context(observer))?;
+        drop(body);
+        Parsed::begin(on, request, memory, observer)
+    };
+    let mut step = on.run(flops, parse).await?;
     let resolved = loop {
         step = match step {
-            Step::Parsed(parsed) => parsed.plan(&call).await?,
-            Step::Planned(planned) => planned.resolve(&call).await?,
+            Step::Parsed(parsed) => parsed.plan(&on).await?,
+            Step::Planned(planned) => planned.resolve(&on).await?,
             Step::Resolved(resolved) => break resolved,
             Step::Answer(_) => return Err(Problem::internal()),
         };
     };
-    let Call { app, admission, operation, .. } = &call;
-    keep_all(app, admission.owner, &resolved.fresh).await;
-    let outlook = resolved.outlook(&call);
-    let seconds = admission.expected_seconds(outlook.as_work(operation));
-    let has_memory = outlook.n_bytes <= app.prepared.memory();
+    keep_all(&on.app, on.owner(), &resolved.fresh).await;
+    let outlook = resolved.outlook(&on);
+    let seconds = on.call.expected_seconds(outlook);
+    let has_memory = outlook.n_bytes <= on.app.prepared.memory();
     Ok(Estimate {
         solver: resolved.fits.main.recipe.solver(),
         outlook,
         seconds,
-        is_admissible: has_memory && seconds <= app.config.deadline_seconds,
+        is_admissible: has_memory && seconds <= on.app.settings.deadline_seconds,
     })
 }

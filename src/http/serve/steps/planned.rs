@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use super::resolved::Resolved;
-use super::{Call, Step};
-use crate::http::compute::JobObserver;
+use super::{OnCall, Step};
 use crate::http::problem::Problem;
 use crate::http::serve::operation::{AnyWork, Plan};
 use crate::http::serve::sampling::find_lacking;
-use crate::store::budget::Reservation;
 use crate::store::clouds::RegisteredCloud;
+use gramian_host::compute::JobObserver;
+use gramian_host::memory::budget::Reservation;
 use gramian_numerics::observer::Observer;
 
 /// A request that is checked. Its fits are complete as far as the request defines them.
@@ -36,24 +36,24 @@ impl Planned {
     ///
     /// # Errors
     /// Returns the refusals of the request.
-    pub fn go_on(mut self, call: &Call, observer: &JobObserver) -> Result<Step, Problem> {
+    pub fn go_on(mut self, on: &OnCall, observer: &JobObserver) -> Result<Step, Problem> {
         if self.plan.fits.lacking_mut().is_some() {
             return Ok(Step::Planned(Box::new(self)));
         }
-        self.resolved(observer)?.go_on(call, observer)
+        self.resolved(observer)?.go_on(on, observer)
     }
 
     /// Finds the facts about clouds and values that fits lack, and completes the fits.
     ///
     /// # Errors
     /// Returns the errors of [`find_lacking`], and the refusals of the fits.
-    pub async fn resolve(mut self, call: &Call) -> Result<Step, Problem> {
+    pub async fn resolve(mut self, on: &OnCall) -> Result<Step, Problem> {
         while let Some(fit) = self.plan.fits.lacking_mut() {
-            find_lacking(&call.app, &call.admission, fit).await?;
+            find_lacking(&on.app, &on.call.admission, fit).await?;
         }
         let flops = self.plan.fits.resolving_flops();
-        let resolve = move |_: &Call, observer: &JobObserver| self.resolved(observer);
-        call.run(flops, resolve).await.map(|resolved| Step::Resolved(Box::new(resolved)))
+        let resolve = move |_: &OnCall, observer: &JobObserver| self.resolved(observer);
+        on.run(flops, resolve).await.map(|resolved| Step::Resolved(Box::new(resolved)))
     }
 
     fn resolved(self, observer: &dyn Observer) -> Result<Resolved, Problem> {

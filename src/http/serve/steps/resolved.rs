@@ -2,18 +2,19 @@
 
 use std::sync::Arc;
 
-use super::fitted::Fitted;
-use super::{Call, Step};
-use crate::config::Config;
-use crate::http::compute::{JobObserver, Work, is_light};
+use axum::http::HeaderValue;
+
+use super::{Answered, OnCall, Step};
 use crate::http::problem::Problem;
-use crate::http::problem::slug::Slug;
-use crate::http::serve::fitting::{Fitting, Outlook};
+use crate::http::serve::fitted::Fits;
+use crate::http::serve::fitting::Fitting;
 use crate::http::serve::operation::AnyWork;
 use crate::http::serve::plan::FitPlans;
-use crate::http::serve::report::AnswerHeaders;
-use crate::store::budget::Reservation;
+use crate::http::state::app::CLOUD_HEADER;
 use crate::store::clouds::RegisteredCloud;
+use gramian_host::compute::{JobObserver, is_light};
+use gramian_host::memory::budget::Reservation;
+use gramian_host::operation::{AnswerHeaders, Outlook, Ready};
 
 /// A request whose fits are complete.
 pub struct Resolved {
@@ -30,25 +31,17 @@ impl Resolved {
     ///
     /// # Errors
     /// Returns the refusals of the computation.
-    pub fn go_on(self, call: &Call, observer: &JobObserver) -> Result<Step, Problem> {
-        let flops = self.fits.cost.flops();
-        if call.wanted.is_none() || !is_light(flops) {
+    pub fn go_on(self, on: &OnCall, observer: &JobObserver) -> Result<Step, Problem> {
+        if on.call.wanted.is_none() || !is_light(self.fits.cost.flops()) {
             return Ok(Step::Resolved(Box::new(self)));
         }
-        let mut report = self.report(call);
-        let Some((fits, memory)) = self.fitting(call).at_hand(&mut report) else {
+        let mut headers = self.headers(on);
+        let Some((fits, memory)) = self.fitting(on).at_hand(&mut headers) else {
             return Ok(Step::Resolved(Box::new(self)));
         };
-        let before = observer.times();
-        let fresh = self.fresh;
-        let fitted = Fitted { fits, work: self.work, flops, intake: self.memory, memory, report };
-        let answer = fitted.answered(call, observer)?.with_fresh(fresh);
-        let after = observer.times();
-        if !after.ended_early {
-            let work = Work { operation: call.operation, is_cached: true, flops };
-            call.admission.did_at_once(work, after.whole - before.whole);
-        }
-        Ok(Step::Answer(Box::new(answer)))
+        let (ready, fresh) = self.with(fits, memory, headers);
+        let answer = ready.answer_at_once(&on.call, observer)?;
+        Ok(Step::Answer(Box::new(Answered { answer, fresh })))
     }
 
     /// Finds or makes the models, in memory that is reserved for all of them at once.
@@ -56,47 +49,35 @@ impl Resolved {
     /// # Errors
     /// 413 if the request takes more memory than there is, 504 if it is expected to take too long, and the
     /// refusals of the factorization.
-    pub async fn fit(self, call: &Call) -> Result<Fitted, Problem> {
-        let mut report = self.report(call);
-        within_deadline(call, self.outlook(call))?;
-        let (fits, memory) = self.fitting(call).fits(&mut report).await?;
-        let flops = self.fits.cost.flops();
-        Ok(Fitted { fits, work: self.work, flops, intake: self.memory, memory, report })
+    pub async fn ready(self, on: &OnCall) -> Result<Ready, Problem> {
+        let mut headers = self.headers(on);
+        on.call.check_deadline(self.outlook(on))?;
+        let (fits, memory) = self.fitting(on).fits(&mut headers).await?;
+        Ok(self.with(fits, memory, headers).0)
+    }
+
+    fn with(
+        self,
+        fits: Fits,
+        memory: Reservation,
+        headers: AnswerHeaders,
+    ) -> (Ready, Vec<Arc<RegisteredCloud>>) {
+        let Self { fits: plans, work, memory: intake, fresh } = self;
+        let compute = move |observer: &JobObserver| work.compute(&fits, observer);
+        (Ready { work: Box::new(compute), flops: plans.cost.flops(), intake, memory, headers }, fresh)
     }
 
     /// Returns the work and memory that the answer takes, as far as they can be foreseen.
-    pub fn outlook(&self, call: &Call) -> Outlook {
-        self.fitting(call).outlook()
+    pub fn outlook(&self, on: &OnCall) -> Outlook {
+        self.fitting(on).outlook()
     }
 
-    fn fitting<'a>(&'a self, call: &'a Call) -> Fitting<'a> {
-        Fitting { app: &call.app, admission: &call.admission, plans: &self.fits }
+    fn fitting<'a>(&'a self, on: &'a OnCall) -> Fitting<'a> {
+        Fitting { app: &on.app, admission: &on.call.admission, plans: &self.fits }
     }
 
-    fn report(&self, call: &Call) -> AnswerHeaders {
-        AnswerHeaders::parsed_in(call.began.elapsed(), self.fits.main.stored.id)
+    fn headers(&self, on: &OnCall) -> AnswerHeaders {
+        let id = HeaderValue::from_str(&self.fits.main.stored.id.to_string()).ok();
+        AnswerHeaders::parsed_in(on.call.began.elapsed()).about(id.map(|id| (CLOUD_HEADER, id)))
     }
-}
-
-/// Factor by which the estimated time may exceed the deadline. Work beyond it is refused before it begins.
-///
-/// Estimates are within a factor of two in the median. They are further off where nothing similar has run
-/// yet.
-const DOUBT: f64 = 4.0;
-
-/// Records the work of a request. Refuses it where other requests would wait for work that is not expected to
-/// end in time. An idle server tries it all the same, and learns from it if the estimate was wrong.
-fn within_deadline(call: &Call, outlook: Outlook) -> Result<(), Problem> {
-    let Call { app, admission, operation, .. } = call;
-    let Config { deadline_seconds, job_seconds, .. } = app.config;
-    let deadline = if admission.is_job() { job_seconds } else { deadline_seconds };
-    let seconds = admission.set_work(outlook.as_work(operation));
-    if seconds <= DOUBT * deadline || app.compute.is_idle_for(admission, outlook.flops) {
-        return Ok(());
-    }
-    let detail = format!(
-        "this would take about {seconds:.0} s, longer than the deadline of {deadline} s, and other work is under way; \
-         nothing was computed"
-    );
-    Err(Problem::new(Slug::DeadlineExceeded, detail))
 }

@@ -14,10 +14,11 @@ use std::sync::Arc;
 
 use super::CloudStore;
 use crate::store::key::CloudId;
-use crate::store::objects::Objects;
+use crate::store::objects::CloudObjects;
 use crate::store::testing::choose::{Choose, Odometer};
 use crate::store::testing::random::Random;
 use crate::store::testing::stepped::{Gate, Stepped, Stops};
+use gramian_host::store::Objects;
 use gramian_numerics::points::cloud::Cloud;
 use object_store::path::Path;
 use requests::{Answer, Process, Request};
@@ -65,7 +66,8 @@ impl World {
     fn new(setting: Setting) -> Self {
         let (store, gate) = Stepped::new(setting.tells_absence, Stops::default());
         let process = |_| {
-            let objects = Arc::new(Objects::over(Arc::new(store.clone()), Path::default()));
+            let objects = Objects::over(Arc::new(store.clone()), Path::default());
+            let objects = CloudObjects(Arc::new(objects));
             Process { clouds: Arc::new(CloudStore::new(setting.n_bytes)), objects }
         };
         let processes = (0..setting.n_processes).map(process).collect();

@@ -4,12 +4,13 @@ use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
 use super::{cloud, id};
-use crate::store::Owner;
 use crate::store::clouds::{CloudStore, Holder, Kept, Recalled, RegisteredCloud};
 use crate::store::key::CloudId;
 use crate::store::objects::cloud_object::{decode, encode};
-use crate::store::objects::{ListWindow, Objects, OwnerName, Retention, Unavailable};
+use crate::store::objects::{CloudObjects, ListWindow, Retention};
 use bytes::Bytes;
+use gramian_host::memory::Owner;
+use gramian_host::store::{OwnerName, Unavailable};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Request {
@@ -37,7 +38,7 @@ pub enum Answer {
 #[derive(Clone)]
 pub struct Process {
     pub clouds: Arc<CloudStore<String>>,
-    pub objects: Arc<Objects>,
+    pub objects: CloudObjects,
 }
 
 fn holder() -> Holder {

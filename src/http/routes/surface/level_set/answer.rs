@@ -4,14 +4,15 @@ use std::sync::Arc;
 
 use super::plan::{LevelOfValues, LevelSetWork};
 use super::{LevelSetResponse, MeshPart, VertexSupport};
-use crate::http::compute::JobObserver;
 use crate::http::fields::{Diagnostics, Warning, WarningCode};
 use crate::http::problem::Problem;
+use crate::http::serve::answers::place::Vertices;
 use crate::http::serve::answers::surface::DeviationArrays;
 use crate::http::serve::fitted::Fits;
-use crate::http::wire::write::array::Array;
-use crate::http::wire::write::integers::Integers;
-use crate::http::wire::write::model::Shape;
+use gramian_host::compute::JobObserver;
+use gramian_host::wire::write::array::Array;
+use gramian_host::wire::write::integers::Integers;
+use gramian_host::wire::write::model::Shape;
 use gramian_numerics::model::{JetRequest, Report};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::median;
@@ -213,7 +214,11 @@ fn answer(
         cells.chunks_exact_mut(d).for_each(|cell| cell.swap(0, 1));
     }
     let codes = support.iter().map(|support| *support as u8).collect();
-    let shape = Shape { positions: meshed.vertices, cells: cells.clone(), labels: vec![("support", codes)] };
+    let shape = Shape {
+        positions: Arc::new(Vertices(meshed.vertices)),
+        cells: cells.clone(),
+        labels: vec![("support", codes)],
+    };
     let [normal, principal, mean] = match at.deviations {
         None => [None, None, None],
         Some(found) if work.asked.has_curvatures => {

@@ -7,19 +7,19 @@ mod plan;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::http::compute::JobObserver;
 use crate::http::fields::{Diagnostics, MeanChoice, OrientationChoice, SurfaceChoice, request};
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::planner::{Planner, ValuesUse};
-use crate::http::wire::negotiation::Format;
-use crate::http::wire::read::members::present_unless_empty;
-use crate::http::wire::write::answer::answer;
-use crate::http::wire::write::array::Array;
-use crate::http::wire::write::integers::Integers;
-use crate::http::wire::write::model::Shape;
+use gramian_host::answer;
+use gramian_host::compute::JobObserver;
+use gramian_host::wire::negotiation::Format;
+use gramian_host::wire::read::members::present_unless_empty;
+use gramian_host::wire::write::array::Array;
+use gramian_host::wire::write::integers::Integers;
+use gramian_host::wire::write::model::Shape;
 use plan::{LevelSetWork, Subject};
 
 /// Shape of the triangles.

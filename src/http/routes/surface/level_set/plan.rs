@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{LevelSetRequest, MeshBounds, MeshInclude, MeshQuality};
 use crate::http::fields::Fit;
 use crate::http::problem::Problem;
-use crate::http::problem::slug::Slug;
+use crate::http::problem::catalogue;
 use crate::http::routes::surface::common::{check_is_surface, geometry_request};
 use crate::http::serve::operation::Plan;
 use crate::http::serve::plan::{Cost, FittedCloud, Values};
@@ -201,7 +201,7 @@ fn check_is_meshable(cloud: &Cloud) -> Result<(), Problem> {
         return Ok(());
     }
     let detail = format!("level sets are meshed in dimensions 2 and 3, the cloud has {}", cloud.dimension());
-    Err(Problem::of_field(Slug::InvalidCloud, "/cloud/points", detail))
+    Err(Problem::of_field(catalogue::INVALID_CLOUD, "/cloud/points", detail))
 }
 
 fn checked_bounds(bounds: &MeshBounds, dimension: usize) -> Result<Bounds, Problem> {
@@ -209,7 +209,7 @@ fn checked_bounds(bounds: &MeshBounds, dimension: usize) -> Result<Bounds, Probl
     for (list, pointer) in [(min, "/bounds/min"), (max, "/bounds/max")] {
         if list.len() != dimension {
             let detail = format!("expected {dimension} coordinates, found {}", list.len());
-            return Err(Problem::of_field(Slug::DimensionMismatch, pointer, detail));
+            return Err(Problem::of_field(catalogue::DIMENSION_MISMATCH, pointer, detail));
         }
     }
     match min.iter().zip(max).position(|(min, max)| min >= max) {

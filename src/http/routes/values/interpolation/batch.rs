@@ -1,7 +1,6 @@
 //! `POST /v1/interpolation/batch`: functions through many lists of values, with one factorization.
 
 use super::{Work, arrays, checked_order, deviations_per_query, has_deviations, numbers_per_query};
-use crate::http::compute::JobObserver;
 use crate::http::fields::{Diagnostics, Fit, MeanChoice, ValuesInclude, request};
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
@@ -10,9 +9,10 @@ use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::plan::Cost;
 use crate::http::serve::planner::{Planner, Restricted, ValuesUse, value_lists};
-use crate::http::wire::read::points::{Points, ValueLists};
-use crate::http::wire::write::answer::answer;
-use crate::http::wire::write::array::Array;
+use gramian_host::answer;
+use gramian_host::compute::JobObserver;
+use gramian_host::wire::read::points::{Points, ValueLists};
+use gramian_host::wire::write::array::Array;
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::machine::price::Sizes;
 use gramian_numerics::model::EachAt;

@@ -4,7 +4,6 @@ mod batch;
 
 use std::sync::Arc;
 
-use crate::http::compute::JobObserver;
 use crate::http::fields::{Diagnostics, Fit, MeanChoice, ValuesInclude, request};
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
@@ -12,10 +11,11 @@ use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::plan::{Cost, Values};
 use crate::http::serve::planner::{GivenValues, Planner, ValuesUse};
-use crate::http::wire::read::points::Points;
-use crate::http::wire::write::answer::answer;
-use crate::http::wire::write::array::Array;
 pub use batch::*;
+use gramian_host::answer;
+use gramian_host::compute::JobObserver;
+use gramian_host::wire::read::points::Points;
+use gramian_host::wire::write::array::Array;
 use gramian_numerics::function::deviations::JetDeviations;
 use gramian_numerics::machine::price::Sizes;
 use gramian_numerics::model::price::function_price;

@@ -7,15 +7,15 @@ use super::{
     FamilyScore, FreeParameter, LeftOut, MAX_PATH_POINTS, ModelSelectionRequest, ModelSelectionResponse,
     N_ALPHAS, PathEntry, SelectionCriterion, SelectionParameter,
 };
-use crate::http::compute::JobObserver;
 use crate::http::fields::kernel::nu_of;
 use crate::http::fields::{KernelFamily, KernelUsed};
-use crate::http::problem::Problem;
+use crate::http::problem::{Problem, from_numerics};
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::plan::Values;
 use crate::http::serve::planner::check_seed;
-use crate::http::wire::write::array::Array;
-use crate::http::wire::write::json::Nullable;
+use gramian_host::compute::JobObserver;
+use gramian_host::wire::write::array::Array;
+use gramian_host::wire::write::json::Nullable;
 use gramian_numerics::error::NumericsError;
 use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::kernel::{Family, Kernel, MAX_MATERN_ORDER, WendlandSmoothness};
@@ -294,10 +294,10 @@ impl Work {
         let refused = |error| match error {
             NumericsError::InvalidVariation { entry, requirement } => {
                 let entry = variations.get(entry).map_or(entry, |(at, _)| *at);
-                Problem::from_numerics(NumericsError::InvalidVariation { entry, requirement }, plan.pointers)
+                from_numerics(NumericsError::InvalidVariation { entry, requirement }, plan.pointers)
             }
             // The search runs in the unit of the values, so its errors are not scaled.
-            other => Problem::from_numerics(other, plan.pointers),
+            other => from_numerics(other, plan.pointers),
         };
         let selected = select(&selection, observer).map_err(refused)?;
         let left_out = leave_one_out_with(selection.observations, &selected.hyperparameters, observer);

@@ -2,17 +2,17 @@
 
 use super::work::{Asked, Found, Work};
 use super::{PosteriorQuantity, Samples};
-use crate::http::compute::JobObserver;
 use crate::http::fields::{Diagnostics, Fit, MeanChoice, request};
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::planner::{Planner, ValuesUse, value_lists};
-use crate::http::wire::read::members::present_unless_empty;
-use crate::http::wire::read::points::{Points, ValueLists};
-use crate::http::wire::write::answer::answer;
-use crate::http::wire::write::array::Array;
+use gramian_host::answer;
+use gramian_host::compute::JobObserver;
+use gramian_host::wire::read::members::present_unless_empty;
+use gramian_host::wire::read::points::{Points, ValueLists};
+use gramian_host::wire::write::array::Array;
 
 request! {
     /// Many lists of noisy values at the points of a cloud, and queries for their posteriors.

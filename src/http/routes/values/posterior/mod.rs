@@ -6,18 +6,18 @@ mod work;
 use serde::Deserialize;
 use utoipa::ToSchema;
 
-use crate::http::compute::JobObserver;
 use crate::http::fields::{Diagnostics, Fit, MeanChoice, request};
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::planner::{GivenValues, Planner, ValuesUse};
-use crate::http::wire::read::members::present_unless_empty;
-use crate::http::wire::read::points::Points;
-use crate::http::wire::write::answer::answer;
-use crate::http::wire::write::array::Array;
 pub use batch::*;
+use gramian_host::answer;
+use gramian_host::compute::JobObserver;
+use gramian_host::wire::read::members::present_unless_empty;
+use gramian_host::wire::read::points::Points;
+use gramian_host::wire::write::array::Array;
 use work::{Asked, Found, Work};
 
 /// Optional parts of a posterior, beside its mean.

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use super::{PosteriorQuantity as Q, Samples};
-use crate::http::compute::JobObserver;
 use crate::http::fields::{Diagnostics, Fit};
 use crate::http::problem::Problem;
 use crate::http::serve::answers::values::mean_coefficients;
@@ -11,8 +10,9 @@ use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::Plan;
 use crate::http::serve::plan::{Cost, PlannedValues, Values};
 use crate::http::serve::planner::{GivenValues, Planner, Restricted, check_seed};
-use crate::http::wire::read::points::Points;
-use crate::http::wire::write::array::Array;
+use gramian_host::compute::JobObserver;
+use gramian_host::wire::read::points::Points;
+use gramian_host::wire::write::array::Array;
 use gramian_numerics::error::{NumericsError, SolverKind};
 use gramian_numerics::function::batch::BatchJets;
 use gramian_numerics::function::deviations::JetDeviations;

@@ -1,7 +1,0 @@
-//! Bodies of requests and answers: content negotiation, compression, entity tags, reading and writing.
-
-pub mod compression;
-pub mod etag;
-pub mod negotiation;
-pub mod read;
-pub mod write;
