@@ -21,8 +21,8 @@ use gramian_numerics::model::{Model, Recipe};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
-use gramian_numerics::solver::{Solution, Solver, System};
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::solver::{Solution, Solver, System};
+use gramian_numerics::regression::sums::regularization::Regularization;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
 
 use crate::common::clouds::fibonacci_sphere;

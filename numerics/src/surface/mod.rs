@@ -14,12 +14,12 @@ mod orientation;
 mod request;
 
 use super::error::{NumericsError, Quantity, Result, SolverKind};
-use super::function::interpolant::Interpolant;
 use super::observer::Observer;
 use crate::machine::vector::dot;
 use crate::points::cloud::Cloud;
 use crate::points::neighbours::{Neighbour, Neighbours};
 use crate::points::sampling::{SPACING_NEIGHBOURS, Sampling};
+use crate::regression::function::interpolant::Interpolant;
 use geometry::GeometryRequest;
 use local::LocalSurface;
 pub use orientation::{SurfaceOrientation, tiles};

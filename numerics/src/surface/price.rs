@@ -9,8 +9,8 @@ use crate::points::duplicates::merging_flops;
 use crate::points::quadric::{n_coefficients, n_quadric_neighbours};
 use crate::points::sampling::{sampling_flops, sampling_price};
 use crate::points::thinning::n_coarse;
-use crate::solver::price::FactorPrice;
-use crate::sums::price::pair_flops;
+use crate::regression::solver::price::FactorPrice;
+use crate::regression::sums::price::pair_flops;
 
 /// Number of queries at which one request may use the offset model. This is as much work as a factorization
 /// of 8,500 points.

@@ -1,9 +1,9 @@
 //! Clouds far from the origin, tiny and huge ones: only coordinate differences relative to ℓ matter.
 
-use gramian_numerics::function::posterior::variances;
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::regression::function::posterior::variances;
 use gramian_numerics::surface::operators::Operator;
 
 use crate::support::*;

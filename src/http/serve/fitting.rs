@@ -16,7 +16,7 @@ use crate::store::prepared::{CacheOutcome, Missing, PreparedFit};
 use gramian_numerics::model::price::MakingPrice;
 use gramian_numerics::model::{Making, Model, SurfaceMaking};
 use gramian_numerics::points::sampling::Sampling;
-use gramian_numerics::solver::Workspace;
+use gramian_numerics::regression::solver::Workspace;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::local::Given;
 

@@ -8,8 +8,8 @@ use gramian_numerics::model::Recipe;
 use gramian_numerics::model::price::system_price;
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::solver::System;
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::solver::System;
+use gramian_numerics::regression::sums::regularization::Regularization;
 
 type Store = PreparedStore<&'static str>;
 

@@ -12,13 +12,13 @@
 use super::super::geometry::Geometry;
 use super::{Operator, regular};
 use crate::error::{NumericsError, Result};
-use crate::function::COLUMNS_AT_ONCE;
-use crate::function::functionals::{JetFunctional, ScaledFit, deviations, has_variance};
-use crate::function::interpolant::Interpolant;
 use crate::machine::vector::{dot, norm};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
-use crate::sums::jets::Jets;
+use crate::regression::function::COLUMNS_AT_ONCE;
+use crate::regression::function::functionals::{JetFunctional, ScaledFit, deviations, has_variance};
+use crate::regression::function::interpolant::Interpolant;
+use crate::regression::sums::jets::Jets;
 
 impl Operator {
     /// Computes standard deviations of the operator on a function, `[m, d]` or `[m]`, 0 at null queries.

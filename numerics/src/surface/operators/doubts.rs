@@ -11,18 +11,18 @@ use super::super::geometry::Geometry;
 use super::deviations::functionals;
 use super::{Operator, regular};
 use crate::error::{NumericsError, Result};
-use crate::function::errors::{Judgement, Process};
-use crate::function::functionals::{JetFunctional, ScaledFit, deviations, has_variance};
-use crate::function::interpolant::Interpolant;
 use crate::kernel::Kernel;
 use crate::machine::vector::norm;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::points::neighbours::{Neighbour, Neighbours};
 use crate::points::thinning::thinned_points;
-use crate::selection::Learned;
-use crate::solver::trend::Trend;
-use crate::sums::regularization::Regularization;
+use crate::regression::function::errors::{Judgement, Process};
+use crate::regression::function::functionals::{JetFunctional, ScaledFit, deviations, has_variance};
+use crate::regression::function::interpolant::Interpolant;
+use crate::regression::selection::Learned;
+use crate::regression::solver::trend::Trend;
+use crate::regression::sums::regularization::Regularization;
 
 /// Most functionals whose errors are computed. They cost little beside a factorization of as many points as
 /// need them.

@@ -9,11 +9,11 @@ use super::deviations::functionals;
 use super::doubts::Findings;
 use super::{Operator, regular};
 use crate::error::Result;
-use crate::function::functionals::JetFunctional;
-use crate::function::local_kriging::{FunctionalsRequest, KrigedFunctionals, LocalKriging};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
-use crate::solver::trend::Trend;
+use crate::regression::function::functionals::JetFunctional;
+use crate::regression::function::local_kriging::{FunctionalsRequest, KrigedFunctionals, LocalKriging};
+use crate::regression::solver::trend::Trend;
 
 /// A function through values, kriged around each query.
 #[derive(Clone, Copy)]

@@ -4,8 +4,8 @@ use crate::machine::price::{Price, Sizes};
 use crate::patches::price::regression_flops;
 use crate::points::monomials::n_stencil_nodes;
 use crate::points::sampling::sampling_flops;
-use crate::solver::price::numbers_at_point;
-use crate::sums::price::pair_flops;
+use crate::regression::solver::price::numbers_at_point;
+use crate::regression::sums::price::pair_flops;
 use crate::surface::price::{AskedOfSurface, deviation_numbers, geometry_flops, numbers_at_query};
 
 /// The price of an operator on a surface of `n_surface_points` points, applied to a function through values.

@@ -1,9 +1,9 @@
 use super::*;
 use crate::kernel::{Family, Kernel};
 use crate::observer::Unobserved;
-use crate::solver::System;
-use crate::solver::trend::Mean;
-use crate::sums::regularization::Regularization;
+use crate::regression::solver::System;
+use crate::regression::solver::trend::Mean;
+use crate::regression::sums::regularization::Regularization;
 use crate::surface::Surface;
 use crate::surface::geometry::{GeometryRequest, SurfaceModel};
 use crate::testing::{all_families, circle, fibonacci_sphere};

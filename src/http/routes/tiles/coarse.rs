@@ -18,7 +18,7 @@ use crate::http::state::app::App;
 use crate::http::wire::read::points::Points;
 use crate::store::Owner;
 use gramian_numerics::machine::price::Price;
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::sums::regularization::Regularization;
 use gramian_numerics::surface::local::coarse::CoarseCloud;
 use gramian_numerics::surface::price::coarse_price;
 

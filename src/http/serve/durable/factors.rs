@@ -15,7 +15,7 @@ use crate::store::objects::pieces::HASH_BYTES;
 use crate::store::objects::{Damaged, Unavailable};
 use crate::store::prepared::PreparedFit;
 use gramian_numerics::model::Model;
-use gramian_numerics::solver::{FactorBuilder, Solver, System};
+use gramian_numerics::regression::solver::{FactorBuilder, Solver, System};
 
 /// Number of points from which a factor is stored: reading 4 n² bytes takes less time than n³/3 flops.
 const WORTH_IT: usize = 4000;

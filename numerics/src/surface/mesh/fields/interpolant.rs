@@ -1,11 +1,11 @@
 //! The level of a function through values, or of a signature function.
 
 use crate::error::Result;
-use crate::function::interpolant::Interpolant;
 use crate::machine::vector::{dot, norm};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
-use crate::sums::jets::JetOrder;
+use crate::regression::function::interpolant::Interpolant;
+use crate::regression::sums::jets::JetOrder;
 use crate::surface::mesh::field::{Feet, Field};
 
 /// Part of the spread of the values up to which a place counts as on the level.

@@ -15,7 +15,7 @@ use crate::http::wire::write::model::Shape;
 use gramian_numerics::model::{JetRequest, Report};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::median;
-use gramian_numerics::sums::jets::JetOrder;
+use gramian_numerics::regression::sums::jets::JetOrder;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::Orientation;
 use gramian_numerics::surface::mesh::fields::interpolant::LevelOf;
