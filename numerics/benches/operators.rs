@@ -17,6 +17,7 @@ use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_uppe
 use faer::{Mat, Par};
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
+use gramian_numerics::operators::Operator;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::regression::function::posterior::variances;
 use gramian_numerics::regression::solver::trend::Mean;
@@ -24,7 +25,6 @@ use gramian_numerics::regression::solver::{Solver, System};
 use gramian_numerics::regression::sums::jets::{JetOrder, Jets};
 use gramian_numerics::regression::sums::regularization::Regularization;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
-use gramian_numerics::surface::operators::Operator;
 use support::common::clouds::{fibonacci_sphere, turned_fibonacci_sphere};
 use support::common::fits;
 use support::{ROUNDS, Times, measure, size_argument, timed};

@@ -48,7 +48,7 @@
 //! cause and the offending point ([`error::NumericsError`]).
 //!
 //! The rooms, each of which knows those before it: [`machine`], [`points`], [`kernel`], [`patches`],
-//! [`regression`], [`surface`], [`model`].
+//! [`regression`], [`orientation`], [`surface`], [`operators`], [`mesh`], [`model`].
 //!
 //! [`Regularization`]: regression::sums::regularization::Regularization
 //! [`System`]: regression::solver::System
@@ -74,7 +74,13 @@ pub mod patches;
 
 pub mod regression;
 
+pub mod orientation;
+
 pub mod surface;
+
+pub mod operators;
+
+pub mod mesh;
 
 pub mod model;
 

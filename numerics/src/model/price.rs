@@ -3,6 +3,10 @@
 use super::Recipe;
 use crate::error::SolverKind;
 use crate::machine::price::{Price, Sizes};
+use crate::mesh::fields::quadrics::BYTES_PER_POINT;
+use crate::mesh::price::{LOCAL_EVALUATION, MeshSize};
+use crate::operators::JUDGED_FUNCTIONALS;
+use crate::operators::price::applied_price;
 use crate::regression::function::COLUMNS_AT_ONCE;
 use crate::regression::function::local_kriging::price::{kriged_operator_price, kriging_price, making_price};
 use crate::regression::function::price::{
@@ -16,10 +20,6 @@ use crate::regression::solver::landmark::price::{
 };
 use crate::regression::solver::price::FactorPrice;
 use crate::regression::sums::price::pair_flops;
-use crate::surface::mesh::fields::quadrics::BYTES_PER_POINT;
-use crate::surface::mesh::price::{LOCAL_EVALUATION, MeshSize};
-use crate::surface::operators::JUDGED_FUNCTIONALS;
-use crate::surface::operators::price::applied_price;
 use crate::surface::price::{
     self as surfaces, AskedOfSurface, local_geometry_price, local_surface_price, signature_surface_price,
 };
@@ -257,7 +257,7 @@ pub fn operator_price(values: SolverKind, surface: SolverKind, asked: OperatorAs
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::operators::price::matrix_price;
+    use crate::operators::price::matrix_price;
     use crate::surface::price::Offsets;
 
     #[test]

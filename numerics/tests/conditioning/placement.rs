@@ -2,9 +2,9 @@
 
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
+use gramian_numerics::operators::Operator;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::regression::function::posterior::variances;
-use gramian_numerics::surface::operators::Operator;
 
 use crate::support::*;
 

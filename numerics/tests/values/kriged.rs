@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use gramian_numerics::kernel::Kernel;
 use gramian_numerics::observer::Unobserved;
+use gramian_numerics::operators::{Kriged, OfKriged, Operator};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling as Spacings;
 use gramian_numerics::regression::function::local_kriging::LocalKriging;
@@ -17,7 +18,6 @@ use gramian_numerics::regression::sums::regularization::Regularization;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
 use gramian_numerics::surface::local::{Given, LocalSurface};
-use gramian_numerics::surface::operators::{Kriged, OfKriged, Operator};
 
 use crate::common::random::Random;
 use crate::fields::Field;

@@ -5,12 +5,12 @@ use super::function::Signature;
 use crate::error::Result;
 use crate::machine::vector::norm;
 use crate::observer::Observer;
+use crate::orientation::Directions;
 use crate::points::cloud::Cloud;
 use crate::points::local_quadrics::LocalQuadrics;
 use crate::points::sampling::Sampling;
 use crate::regression::sums::jets::{JetOrder, Jets};
 use crate::surface::degeneracy::lacks_normal;
-use crate::surface::orientation::Directions;
 
 /// Step of the difference quotient along a local normal, in spacings, for kernels without a gradient at the
 /// points.

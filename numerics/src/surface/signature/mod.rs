@@ -12,11 +12,11 @@ use std::sync::{Arc, OnceLock};
 
 use super::NearNormals;
 use super::degeneracy::is_too_rough;
-use super::orientation::{Oriented, Sampled, SurfaceOrientation, n_around};
 use crate::error::{NumericsError, Result};
 use crate::machine::heap::{arc_payload, block_bytes, vec_bytes};
 use crate::machine::vector::dot;
 use crate::observer::Observer;
+use crate::orientation::{Oriented, Sampled, SurfaceOrientation, n_around};
 use crate::patches::Patches;
 use crate::points::cloud::Cloud;
 use crate::points::duplicates::count_duplicates;

@@ -19,7 +19,7 @@ use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
 use crate::http::wire::write::integers::Integers;
-use gramian_numerics::surface::operators::Operator;
+use gramian_numerics::operators::Operator;
 
 const OPERATOR: Operator = Operator::LaplaceBeltrami;
 
