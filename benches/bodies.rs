@@ -18,11 +18,11 @@ use axum::Router;
 use axum::routing::get;
 use clap::Parser;
 use gramian::config::Config;
+use gramian::http::fields::limits::{Limits, unobserved};
 use gramian::http::problem::Problem;
 use gramian::http::state::app::App;
 use gramian_host::memory::Owner;
 use gramian_host::wire::negotiation::{Coding, Format, Wanted};
-use gramian_host::wire::read::limits::ParseContext;
 use gramian_host::wire::read::parse::parse_json;
 use gramian_host::wire::read::points::Points;
 use gramian_host::wire::write::answer::{Answer, Member, Parts};
@@ -43,7 +43,9 @@ fn main() {
         "{N_POINTS} random points, {megabytes:.0} MB of JSON, MB per second of one core, best of {ROUNDS}"
     );
     let text = [br#"{"points":"#, json.as_slice(), b"}"].concat();
-    let ours = best(|| parse_json::<Request>(&text, &ParseContext::UNLIMITED).unwrap().points.coordinates);
+    let lists = Limits::NONE.lists();
+    let context = unobserved(&lists);
+    let ours = best(|| parse_json::<Request>(&text, &context).unwrap().points.coordinates);
     let theirs = best(|| serde_json::from_slice::<Vec<[f64; 3]>>(&json).unwrap());
     println!("{:44} {:8.0}", "read into the flat buffer", megabytes / ours);
     println!("{:44} {:8.0}", "the same by serde_json into [f64; 3]", megabytes / theirs);

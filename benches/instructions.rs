@@ -12,20 +12,20 @@ use std::hint::black_box;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use gramian::http::fields::limits::{Limits, unobserved};
 use gramian::store::key::CloudId;
-use gramian_host::wire::read::limits::ParseContext;
 use gramian_host::wire::read::parse::parse_json;
 use gramian_host::wire::read::points::Points;
 use gramian_host::wire::write::array::Array;
-use gramian_numerics::function::posterior;
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::machine::instruction_set::InstructionSet;
 use gramian_numerics::observer::{Observer, Stage, Unobserved};
 use gramian_numerics::points::sampling::Sampling;
-use gramian_numerics::solver::{Solution, Solver, System};
-use gramian_numerics::sums::jets::{JetOrder, Jets};
-use gramian_numerics::sums::nodes::Nodes;
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::function::posterior;
+use gramian_numerics::regression::solver::{Solution, Solver, System};
+use gramian_numerics::regression::sums::jets::{JetOrder, Jets};
+use gramian_numerics::regression::sums::nodes::Nodes;
+use gramian_numerics::regression::sums::regularization::Regularization;
 use gramian_numerics::surface::Surface;
 use support::common::clouds::fibonacci_sphere;
 use support::common::fits;
@@ -153,7 +153,9 @@ fn json_points() {
     let cloud = scattered(5000, 3, 3);
     let rows: Vec<&[f64]> = cloud.points().collect();
     let text = serde_json::to_vec(&serde_json::json!({ "points": rows })).unwrap();
-    let request = measured(|| parse_json::<Request>(&text, &ParseContext::UNLIMITED)).unwrap();
+    let lists = Limits::NONE.lists();
+    let context = unobserved(&lists);
+    let request = measured(|| parse_json::<Request>(&text, &context)).unwrap();
     assert_eq!(request.points.coordinates, cloud.coordinates());
 }
 

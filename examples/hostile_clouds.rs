@@ -7,8 +7,8 @@ use std::time::Instant;
 
 use clap::Parser;
 use gramian::config::Config;
+use gramian::http::serve;
 use gramian::http::state::app::App;
-use gramian::server::serve;
 use serde_json::{Value, json};
 use tokio::net::TcpListener;
 

@@ -7,7 +7,7 @@ use clap::Parser;
 use futures_util::future::OptionFuture;
 use gramian::config::Config;
 use gramian::files::{self, FileCommand};
-use gramian::http::router;
+use gramian::http;
 use gramian::http::serve::durable;
 use gramian::http::state::app::App;
 use gramian_host::process::signals::{self, Signals};
@@ -137,7 +137,6 @@ async fn serve(config: Config, while_stdin: bool) -> Result<(), Box<dyn std::err
     tokio::spawn(durable::catch_up(app.clone()));
     tokio::spawn(durable::retain(app.clone()));
     tokio::spawn(app.keys.clone().follow_file());
-    let (router, runner) = router(app);
-    server::serve(runner, router, listener, stop).await?;
+    http::serve(app, listener, stop).await?;
     Ok(())
 }

@@ -13,6 +13,7 @@ use gramian::store::clouds::CloudStore;
 use gramian::store::key::{CloudId, FitKey, ValuesKey};
 use gramian::store::prepared::{PreparedBytes, PreparedFit, PreparedStore};
 use gramian_host::memory::Owner;
+use gramian_host::memory::budget::Budget;
 use gramian_numerics::error::NumericsError;
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::{Family, Kernel};
@@ -21,8 +22,8 @@ use gramian_numerics::model::{Model, Recipe};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
-use gramian_numerics::solver::{Solution, Solver, System};
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::solver::{Solution, Solver, System};
+use gramian_numerics::regression::sums::regularization::Regularization;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
 
 use crate::common::clouds::fibonacci_sphere;
@@ -53,8 +54,8 @@ async fn what_the_stores_count_is_what_they_take() {
     let clouds = |from: usize, to: usize| {
         async move |store: &Clouds, k: usize| keep_cloud(store, scattered(k, from, to), k).await
     };
-    let bytes = PreparedBytes { kept: BUDGET, spare: BUDGET / 8, budget: BUDGET, n_owners: 1 };
-    let (new_factors, new_clouds) = (|| Factors::new(bytes), || Clouds::new(BUDGET));
+    let bytes = PreparedBytes { kept: BUDGET, spare: BUDGET / 8 };
+    let (new_factors, new_clouds) = (|| Factors::new(bytes, Budget::new(BUDGET, 1)), || Clouds::new(BUDGET));
     let measurements = [
         growth("weights of 64 to 1,000 values", new_factors(), Factors::n_bytes, 60_000, keep_weights).await,
         growth("clouds of 10 to 300 points", new_clouds(), Clouds::n_bytes, 40_000, clouds(10, 300)).await,

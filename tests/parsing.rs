@@ -12,13 +12,12 @@ use std::io::Write;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use gramian::http::fields::limits::{Limits, unobserved};
 use gramian::http::problem::Problem;
 use gramian_host::wire::negotiation::{BodyFormat, Coding};
 use gramian_host::wire::read::body::RequestBody;
-use gramian_host::wire::read::limits::ParseContext;
 use gramian_host::wire::read::members::present_unless_empty;
 use gramian_host::wire::read::points::Points;
-use gramian_numerics::observer::Unobserved;
 use peak_alloc::PeakAlloc;
 use proptest::prelude::*;
 use safetensors::Dtype;
@@ -37,8 +36,7 @@ const BASE_BYTES: usize = 2 << 20;
 /// Size limit of bodies, three quarters of the default, so that the bodies here can be smaller.
 const LIMIT_BYTES: usize = 48 << 20;
 
-const CONTEXT: ParseContext<'static> =
-    ParseContext { max_points: 2000, max_queries: 3000, max_dimension: 16, observer: &Unobserved };
+const LIMITS: Limits = Limits { max_points: 2000, max_queries: 3000, max_dimension: 16 };
 
 /// A request with every kind of member.
 #[derive(Debug, Deserialize)]
@@ -107,11 +105,13 @@ fn parse(format: BodyFormat, coding: Coding, body: &[u8]) -> Outcome {
     ALLOCATOR.reset_peak_usage();
     let began = Instant::now();
     let request = RequestBody::new(format, coding, body.to_vec(), LIMIT_BYTES);
-    let unpacked = request.unpack(&CONTEXT, is_room);
+    let lists = LIMITS.lists();
+    let context = unobserved(&lists);
+    let unpacked = request.unpack(&context, is_room);
     let problem = match (unpacked, format) {
         (Err(problem), _) => Some(problem),
-        (Ok(body), BodyFormat::Npy | BodyFormat::Ply) => body.parse::<CloudRequest>(&CONTEXT).err(),
-        (Ok(body), BodyFormat::Json | BodyFormat::Safetensors) => body.parse::<Request>(&CONTEXT).err(),
+        (Ok(body), BodyFormat::Npy | BodyFormat::Ply) => body.parse::<CloudRequest>(&context).err(),
+        (Ok(body), BodyFormat::Json | BodyFormat::Safetensors) => body.parse::<Request>(&context).err(),
     };
     let took = began.elapsed();
     let peak = ALLOCATOR.peak_usage() - before;

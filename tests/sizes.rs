@@ -9,6 +9,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use axum::response::Response;
+use gramian::http::fields::limits::{Limits, unobserved};
 use gramian::http::problem::Problem;
 use gramian::store::clouds::CloudStore;
 use gramian_host::compute::Compute;
@@ -16,25 +17,24 @@ use gramian_host::memory::Owner;
 use gramian_host::memory::budget::Budget;
 use gramian_host::wire::negotiation::{BodyFormat, Coding, Format, Wanted};
 use gramian_host::wire::read::body::RequestBody;
-use gramian_host::wire::read::limits::ParseContext;
 use gramian_host::wire::read::members::present_unless_empty;
 use gramian_host::wire::read::points::Points;
 use gramian_host::wire::write::answer::{Answer, Member, Parts};
 use gramian_host::wire::write::array::Array;
 use gramian_host::wire::write::encode::Encoded;
-use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::kernel::{Family, Kernel};
+use gramian_numerics::mesh::fields::interpolant::LevelOf;
+use gramian_numerics::mesh::price::{MeshSize, Within};
+use gramian_numerics::mesh::surface::{MeshOptions, mesh_of_level};
+use gramian_numerics::mesh::{Bounds, Quality};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
-use gramian_numerics::selection::{Noise, Observed, learn, learning_price};
-use gramian_numerics::solver::trend::Mean;
-use gramian_numerics::solver::{Solver, System};
-use gramian_numerics::sums::regularization::Regularization;
-use gramian_numerics::surface::mesh::fields::interpolant::LevelOf;
-use gramian_numerics::surface::mesh::price::{MeshSize, Within};
-use gramian_numerics::surface::mesh::surface::{MeshOptions, mesh_of_level};
-use gramian_numerics::surface::mesh::{Bounds, Quality};
+use gramian_numerics::regression::function::interpolant::Interpolant;
+use gramian_numerics::regression::selection::{Noise, Observed, learn, learning_price};
+use gramian_numerics::regression::solver::trend::Mean;
+use gramian_numerics::regression::solver::{Solver, System};
+use gramian_numerics::regression::sums::regularization::Regularization;
 use http_body_util::BodyExt;
 use peak_alloc::PeakAlloc;
 use safetensors::Dtype;
@@ -122,9 +122,11 @@ fn ply_in_binary(points: &[f64], is_double: bool) -> Vec<u8> {
 /// Registers the cloud of a body in a store, and returns the bytes that are kept.
 fn register(format: BodyFormat, body: Vec<u8>) -> usize {
     let limit = body.len();
+    let lists = Limits::NONE.lists();
+    let context = unobserved(&lists);
     let request: Request = RequestBody::new(format, Coding::Identity, body, limit)
-        .unpack(&ParseContext::UNLIMITED, |_| Ok(()))
-        .and_then(|body| body.parse(&ParseContext::UNLIMITED))
+        .unpack(&context, |_| Ok(()))
+        .and_then(|body| body.parse(&context))
         .unwrap_or_else(|problem| panic!("{format:?}: {problem:?}"));
     let cloud = |points: Points| Cloud::new(points.coordinates, points.dimension).unwrap();
     let store = CloudStore::<Problem>::new(usize::MAX);

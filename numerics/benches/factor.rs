@@ -14,8 +14,8 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Stage;
-use gramian_numerics::solver::{Solver, System};
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::solver::{Solver, System};
+use gramian_numerics::regression::sums::regularization::Regularization;
 use support::common::clouds::fibonacci_sphere;
 use support::{ROUNDS, Stopwatch, measure, size_argument, timed};
 

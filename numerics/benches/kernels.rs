@@ -15,9 +15,9 @@ use gramian_numerics::kernel::{Family, Kernel, WendlandSmoothness};
 use gramian_numerics::machine::instruction_set::InstructionSet;
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::sums::gram::fill_cross_gram;
-use gramian_numerics::sums::jets::{JetOrder, Jets};
-use gramian_numerics::sums::nodes::Nodes;
+use gramian_numerics::regression::sums::gram::fill_cross_gram;
+use gramian_numerics::regression::sums::jets::{JetOrder, Jets};
+use gramian_numerics::regression::sums::nodes::Nodes;
 use support::scattered;
 
 const N_POINTS: usize = 4096;

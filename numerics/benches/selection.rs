@@ -10,9 +10,11 @@ use std::time::Instant;
 
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Stage;
-use gramian_numerics::selection::{Criterion, Hyperparameters, Observations, alpha_path, default_alphas};
-use gramian_numerics::solver::trend::Mean;
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::selection::{
+    Criterion, Hyperparameters, Observations, alpha_path, default_alphas,
+};
+use gramian_numerics::regression::solver::trend::Mean;
+use gramian_numerics::regression::sums::regularization::Regularization;
 use support::common::clouds::{fibonacci_sphere, waves};
 use support::{Stopwatch, size_argument};
 

@@ -19,7 +19,7 @@ mod jet;
 mod posterior;
 
 use features::{Bands, Feature, Measured};
-use gramian_numerics::selection::Criterion;
+use gramian_numerics::regression::selection::Criterion;
 use posterior::By;
 use rayon::prelude::*;
 

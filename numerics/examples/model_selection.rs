@@ -9,11 +9,11 @@ use std::time::Instant;
 use gramian_numerics::kernel::Family;
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::selection::{
+use gramian_numerics::regression::selection::{
     Criterion, Hyperparameters, MAX_EVALUATIONS, Observations, Parameter, Selection, Variation, select,
 };
-use gramian_numerics::solver::trend::Mean;
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::solver::trend::Mean;
+use gramian_numerics::regression::sums::regularization::Regularization;
 
 /// Bounds of length scales, variance and noise, equal to those of the script.
 const LENGTH_SCALES: [f64; 2] = [1e-2, 1e3];

@@ -13,7 +13,7 @@ mod jet;
 mod posterior;
 
 use fields::FIELDS;
-use gramian_numerics::selection::Criterion;
+use gramian_numerics::regression::selection::Criterion;
 use posterior::{By, Found, Sensors};
 use rayon::prelude::*;
 

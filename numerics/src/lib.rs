@@ -1,19 +1,19 @@
 //! Geometric kernel interpolation and regression on point clouds, after Guidotti: f64 in, f64 out.
 //!
-//! A cloud of n points, a [`kernel::Kernel`] and a [`sums::regularization::Regularization`] α make a
-//! [`solver::System`], K + αI. A [`solver::Solver`] factorizes it once. Functions through values, their
-//! variances, and the surface that the points sample are then solves and sums:
+//! A cloud of n points, a [`kernel::Kernel`] and a [`Regularization`] α make a [`System`], K + αI. A
+//! [`Solver`] factorizes it once. Functions through values, their variances, and the surface that the points
+//! sample are then solves and sums:
 //!
 //! ```
 //! use std::sync::Arc;
 //!
-//! use gramian_numerics::function::interpolant::Interpolant;
+//! use gramian_numerics::regression::function::interpolant::Interpolant;
 //! use gramian_numerics::kernel::{Family, Kernel};
 //! use gramian_numerics::observer::Unobserved;
 //! use gramian_numerics::points::cloud::Cloud;
-//! use gramian_numerics::solver::{Solver, System};
-//! use gramian_numerics::sums::jets::JetOrder;
-//! use gramian_numerics::sums::regularization::Regularization;
+//! use gramian_numerics::regression::solver::{Solver, System};
+//! use gramian_numerics::regression::sums::jets::JetOrder;
+//! use gramian_numerics::regression::sums::regularization::Regularization;
 //! use gramian_numerics::surface::Surface;
 //! use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
 //!
@@ -48,7 +48,11 @@
 //! cause and the offending point ([`error::NumericsError`]).
 //!
 //! The rooms, each of which knows those before it: [`machine`], [`points`], [`kernel`], [`patches`],
-//! [`sums`], [`solver`], [`selection`], [`function`], [`surface`], [`model`].
+//! [`regression`], [`orientation`], [`surface`], [`operators`], [`mesh`], [`model`].
+//!
+//! [`Regularization`]: regression::sums::regularization::Regularization
+//! [`System`]: regression::solver::System
+//! [`Solver`]: regression::solver::Solver
 
 // A request must never bring a thread down; tests may.
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
@@ -68,15 +72,15 @@ pub mod kernel;
 
 pub mod patches;
 
-pub mod sums;
+pub mod regression;
 
-pub mod solver;
-
-pub mod selection;
-
-pub mod function;
+pub mod orientation;
 
 pub mod surface;
+
+pub mod operators;
+
+pub mod mesh;
 
 pub mod model;
 

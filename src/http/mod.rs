@@ -13,6 +13,7 @@ use axum::Router;
 use axum::http::{HeaderName, HeaderValue, Method, header};
 use axum::middleware::{from_fn, from_fn_with_state};
 use axum::routing::{MethodRouter, get};
+use tokio::net::TcpListener;
 use tower::util::option_layer;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::cors::{AllowOrigin, CorsLayer};
@@ -22,6 +23,7 @@ use utoipa_axum::routes;
 
 use gramian_host::around::{authentication, middleware};
 use gramian_host::jobs::{self, Runner};
+use gramian_host::server;
 use gramian_host::state::settings::Origins;
 use openapi::version_3_0;
 use routes::pages::{documentation, viewer};
@@ -31,6 +33,19 @@ use routes::tiles::{coarse, regions, sides};
 use routes::values::{interpolation, model_selection, posterior};
 use routes::{clouds, estimate, jobs as job_routes, kernels, pages, process};
 use state::app::App;
+
+/// Serves until `stop` resolves, then drains and returns.
+///
+/// # Errors
+/// Returns the errors of [`server::serve`].
+pub async fn serve(
+    app: Arc<App>,
+    listener: TcpListener,
+    stop: impl Future<Output = ()> + Send + 'static,
+) -> std::io::Result<()> {
+    let (router, runner) = router(app);
+    server::serve(runner, router, listener, stop).await
+}
 
 /// Returns the service as one router, and the runner of its jobs.
 pub fn router(app: Arc<App>) -> (Router, Runner) {

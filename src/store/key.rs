@@ -8,8 +8,8 @@ use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::model::Recipe;
 use gramian_numerics::patches::PatchKernel;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::solver::trend::Mean;
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::solver::trend::Mean;
+use gramian_numerics::regression::sums::regularization::Regularization;
 use gramian_numerics::surface::local::{Learning, SurfaceHyperparameters};
 
 /// Id of a cloud: a BLAKE3 hash, written as 64 hexadecimal digits.

@@ -7,7 +7,7 @@ use gramian_host::memory::Owner;
 use gramian_host::memory::fair_cache::FairCache;
 use gramian_host::memory::single_flight::SingleFlight;
 use gramian_numerics::machine::heap::{arc_payload, block_bytes};
-use gramian_numerics::selection::Learned;
+use gramian_numerics::regression::selection::Learned;
 
 /// Bytes of the whole cache: thousands of entries, and part of the fixed footprint of the process.
 const MAX_BYTES: usize = 1 << 20;

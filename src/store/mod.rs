@@ -18,6 +18,7 @@ pub mod learned;
 pub mod objects;
 pub mod prepared;
 #[cfg(test)]
+#[allow(dead_code, reason = "the host uses all of it")]
 #[path = "../../host/src/store/testing/mod.rs"]
 mod testing;
 

@@ -13,7 +13,7 @@ use gramian_host::memory::{CacheOutcome, Owner};
 use gramian_numerics::machine::heap::{arc_payload, block_bytes};
 use gramian_numerics::machine::pages::SpareBuffer;
 use gramian_numerics::model::Model;
-use gramian_numerics::solver::{Known, Solution, Solver};
+use gramian_numerics::regression::solver::{Known, Solution, Solver};
 use gramian_numerics::surface::Surface;
 
 /// Divisor of the cache size that gives the share of weights: they are n numbers beside the n² of a dense

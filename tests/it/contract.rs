@@ -18,7 +18,7 @@ mod tests;
 
 use std::sync::LazyLock;
 
-use crate::http::problem::catalogue;
+use gramian::http::problem;
 use serde_json::{Value, json};
 
 pub use answer::{Received, decompressed};
@@ -89,7 +89,7 @@ impl Contract {
             return vec![format!("{} is no problem document", answer.status)];
         };
         let mut found = violations("problem", &self.problem, &problem);
-        let slug = problem["type"].as_str().and_then(|kind| Slug::parse(kind.strip_prefix("/problems/")?));
+        let slug = problem["type"].as_str().and_then(|kind| problem::named(kind.strip_prefix("/problems/")?));
         if slug.is_none_or(|slug| slug.status().as_u16() != answer.status) {
             found.push(format!("type {} has another status than {}", problem["type"], answer.status));
         }

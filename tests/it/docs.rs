@@ -10,9 +10,9 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::http::problem::catalogue;
 use clap::Args;
 use gramian::config::Config;
+use gramian::http::problem;
 use serde_json::Value;
 
 use crate::support::overwrites;
@@ -154,7 +154,7 @@ fn every_problem_is_in_the_table() {
         })
         .collect();
     let expected: Vec<_> =
-        Slug::ALL.iter().map(|slug| (slug.as_str().to_owned(), slug.status().as_u16())).collect();
+        problem::all().iter().map(|slug| (slug.as_str().to_owned(), slug.status().as_u16())).collect();
     assert_eq!(listed, expected);
 }
 

@@ -1,6 +1,6 @@
 //! Pages for people (root, problems, docs), probes and the version.
 
-use crate::http::problem::catalogue;
+use gramian::http::problem;
 use serde_json::{Value, json};
 
 use crate::routes::ROUTES;
@@ -9,7 +9,7 @@ use crate::support::{Answer, Server};
 #[tokio::test]
 async fn every_type_of_problem_has_a_page() {
     let server = Server::start().await;
-    for slug in Slug::ALL {
+    for slug in problem::all() {
         let page = server.get(&format!("/problems/{}", slug.as_str())).await;
         assert_eq!(page.status, 200);
         assert!(page.header("content-type").starts_with("text/html"));
@@ -26,9 +26,9 @@ async fn every_type_of_problem_has_a_page() {
     ];
     let slugs: Vec<&str> = slugs.iter().flat_map(|line| line.split(' ')).collect();
     for slug in &slugs {
-        assert!(Slug::parse(slug).is_some(), "{slug}");
+        assert!(problem::named(slug).is_some(), "{slug}");
     }
-    assert_eq!(slugs.len(), Slug::ALL.len());
+    assert_eq!(slugs.len(), problem::all().len());
 }
 
 #[tokio::test]
@@ -51,7 +51,8 @@ async fn the_root_page_links_to_every_page() {
 async fn problems_are_listed_with_links_to_their_pages() {
     let server = Server::start().await;
     let links = links(&server.get("/problems").await);
-    let expected: Vec<String> = Slug::ALL.iter().map(|slug| format!("problems/{}", slug.as_str())).collect();
+    let expected: Vec<String> =
+        problem::all().iter().map(|slug| format!("problems/{}", slug.as_str())).collect();
     assert_eq!(links, expected);
     for link in links {
         assert_eq!(server.get(&format!("/{link}")).await.status, 200, "{link}");

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use clap::Parser;
 use gramian::config::Config;
+use gramian::http::serve;
 use gramian::http::state::app::App;
-use gramian::server::serve;
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
@@ -131,7 +131,7 @@ thread_local! {
 
 /// Begins a client. One that speaks TLS needs a cryptographic provider, which is that of the process.
 pub fn http_client() -> reqwest::ClientBuilder {
-    gramian::server::install_provider();
+    gramian_host::server::install_provider();
     reqwest::Client::builder()
 }
 

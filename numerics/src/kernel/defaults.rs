@@ -80,13 +80,13 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::function::interpolant::Interpolant;
     use crate::observer::Unobserved;
     use crate::points::cloud::Cloud;
     use crate::points::noise::estimate_noise;
     use crate::points::sampling::Sampling;
-    use crate::solver::{Solver, System};
-    use crate::sums::regularization::Regularization;
+    use crate::regression::function::interpolant::Interpolant;
+    use crate::regression::solver::{Solver, System};
+    use crate::regression::sums::regularization::Regularization;
     use crate::surface::Surface;
     use crate::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
     use crate::testing::{circle, fibonacci_sphere};

@@ -4,7 +4,7 @@ use crate::kernel::Kernel;
 use crate::kernel::defaults::Purpose;
 use crate::patches::MAX_LOCAL_DIMENSION;
 use crate::points::cloud::Cloud;
-use crate::sums::regularization::Regularization;
+use crate::regression::sums::regularization::Regularization;
 
 /// Number of points from which `auto` regresses a surface locally, unless kernel or α are given.
 ///

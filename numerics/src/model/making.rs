@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use super::{Model, Recipe};
 use crate::error::Result;
-use crate::function::local_kriging::LocalKriging;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::points::sampling::Sampling;
-use crate::solver::{Solver, System, Workspace};
+use crate::regression::function::local_kriging::LocalKriging;
+use crate::regression::solver::{Solver, System, Workspace};
 
 /// Inputs of a model besides its recipe.
 pub struct Making<'a> {

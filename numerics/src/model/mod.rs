@@ -16,13 +16,13 @@ mod values;
 use std::sync::Arc;
 
 use crate::error::{NumericsError, Quantity, Result, SolverKind};
-use crate::function::interpolant::Interpolant;
-use crate::function::local_kriging::LocalKriging;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::points::sampling::Sampling;
-use crate::solver::trend::Mean;
-use crate::solver::{Known, Method, Solution, Solver, Sought};
+use crate::regression::function::interpolant::Interpolant;
+use crate::regression::function::local_kriging::LocalKriging;
+use crate::regression::solver::trend::Mean;
+use crate::regression::solver::{Known, Method, Solution, Solver, Sought};
 use crate::surface::Surface;
 use crate::surface::local::{Given, LocalSurface};
 use crate::surface::signature::{Signature, SignatureSurface};

@@ -2,18 +2,24 @@
 
 use super::Recipe;
 use crate::error::SolverKind;
-use crate::function::COLUMNS_AT_ONCE;
-use crate::function::local_kriging::price::{kriged_operator_price, kriging_price, making_price};
-use crate::function::price::{self as functions, deviations_price, judging_price, many_price, samples_price};
 use crate::machine::price::{Price, Sizes};
-use crate::solver::iterative::price::{iterative_covariances_price, iterative_fit_price, iterative_price};
-use crate::solver::landmark::price::{LandmarkPrice, landmark_fit_flops, on_centres, on_landmarks};
-use crate::solver::price::FactorPrice;
-use crate::sums::price::pair_flops;
-use crate::surface::mesh::fields::quadrics::BYTES_PER_POINT;
-use crate::surface::mesh::price::{LOCAL_EVALUATION, MeshSize};
-use crate::surface::operators::JUDGED_FUNCTIONALS;
-use crate::surface::operators::price::applied_price;
+use crate::mesh::fields::quadrics::BYTES_PER_POINT;
+use crate::mesh::price::{LOCAL_EVALUATION, MeshSize};
+use crate::operators::JUDGED_FUNCTIONALS;
+use crate::operators::price::applied_price;
+use crate::regression::function::COLUMNS_AT_ONCE;
+use crate::regression::function::local_kriging::price::{kriged_operator_price, kriging_price, making_price};
+use crate::regression::function::price::{
+    self as functions, deviations_price, judging_price, many_price, samples_price,
+};
+use crate::regression::solver::iterative::price::{
+    iterative_covariances_price, iterative_fit_price, iterative_price,
+};
+use crate::regression::solver::landmark::price::{
+    LandmarkPrice, landmark_fit_flops, on_centres, on_landmarks,
+};
+use crate::regression::solver::price::FactorPrice;
+use crate::regression::sums::price::pair_flops;
 use crate::surface::price::{
     self as surfaces, AskedOfSurface, local_geometry_price, local_surface_price, signature_surface_price,
 };
@@ -251,7 +257,7 @@ pub fn operator_price(values: SolverKind, surface: SolverKind, asked: OperatorAs
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::operators::price::matrix_price;
+    use crate::operators::price::matrix_price;
     use crate::surface::price::Offsets;
 
     #[test]

@@ -5,8 +5,8 @@ use std::ops::RangeInclusive;
 use crate::error::Result;
 use crate::kernel::Kernel;
 use crate::kernel::defaults::DEFAULT_ALPHA;
-use crate::selection::Learned;
-use crate::sums::regularization::Regularization;
+use crate::regression::selection::Learned;
+use crate::regression::sums::regularization::Regularization;
 
 /// Ratios of noise to variance that lose no digit.
 const RATIOS: RangeInclusive<f64> = 1e-280..=1e280;

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use crate::error::{NumericsError, SolverKind};
 use crate::kernel::Kernel;
 use crate::points::cloud::Cloud;
-use crate::solver::{DEFAULT_TOLERANCE, System};
-use crate::sums::regularization::Regularization;
+use crate::regression::solver::{DEFAULT_TOLERANCE, System};
+use crate::regression::sums::regularization::Regularization;
 use crate::surface::local::Learning;
 
 /// Choice of a solver and its parameters. Equal recipes over equal clouds give equal models.

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use crate::solver::trend::Trend;
-use crate::solver::{Disagreement, Method, Remaining, Solution, Solver};
+use crate::regression::solver::trend::Trend;
+use crate::regression::solver::{Disagreement, Method, Remaining, Solution, Solver};
 use crate::surface::Surface;
 use crate::surface::local::SurfaceHyperparameters;
 

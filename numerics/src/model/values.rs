@@ -2,16 +2,16 @@
 
 use super::{Model, Report};
 use crate::error::{NumericsError, Quantity, Result};
-use crate::function::batch::{Batch, BatchJets};
-use crate::function::deviations::JetDeviations;
-use crate::function::interpolant::Interpolant;
-use crate::function::local_kriging::{KrigingRequest, LocalKriging};
-use crate::function::posterior::{Variances, variances_with_mean};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
-use crate::solver::Known;
-use crate::solver::trend::{Mean, Trend};
-use crate::sums::jets::{JetOrder, Jets};
+use crate::regression::function::batch::{Batch, BatchJets};
+use crate::regression::function::deviations::JetDeviations;
+use crate::regression::function::interpolant::Interpolant;
+use crate::regression::function::local_kriging::{KrigingRequest, LocalKriging};
+use crate::regression::function::posterior::{Variances, variances_with_mean};
+use crate::regression::solver::Known;
+use crate::regression::solver::trend::{Mean, Trend};
+use crate::regression::sums::jets::{JetOrder, Jets};
 
 /// Values at the fitted points, with the known parameters of their process.
 #[derive(Clone, Copy)]

@@ -2,14 +2,14 @@
 //! (docs/numerics.md, Geometry).
 
 use crate::error::Result;
-use crate::function::interpolant::Interpolant;
 use crate::kernel::{Kernel, MAX_SLOPE};
 use crate::machine::vector::{dot, norm};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::points::local_quadrics::LocalQuadric;
 use crate::points::sampling::Scales;
-use crate::sums::jets::{JetOrder, Jets};
+use crate::regression::function::interpolant::Interpolant;
+use crate::regression::sums::jets::{JetOrder, Jets};
 
 /// The reason why a query is degenerate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -163,8 +163,8 @@ mod tests {
     use super::*;
     use crate::kernel::Family;
     use crate::observer::Unobserved;
-    use crate::solver::{Solver, System};
-    use crate::sums::regularization::Regularization;
+    use crate::regression::solver::{Solver, System};
+    use crate::regression::sums::regularization::Regularization;
     use crate::testing::fibonacci_sphere;
 
     #[test]

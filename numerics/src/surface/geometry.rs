@@ -42,7 +42,7 @@ impl Geometry {
     /// Computes the geometry at each query: that of the level surface of the function through the query.
     ///
     /// # Errors
-    /// Returns the errors of [`crate::function::interpolant::Interpolant::at`].
+    /// Returns the errors of [`crate::regression::function::interpolant::Interpolant::at`].
     pub fn of(
         surface: &Surface,
         queries: &Cloud,
@@ -211,12 +211,12 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::function::interpolant::Interpolant;
     use crate::kernel::{Family, Kernel};
     use crate::machine::vector::dot;
     use crate::observer::Unobserved;
-    use crate::solver::{Solver, System};
-    use crate::sums::regularization::Regularization;
+    use crate::regression::function::interpolant::Interpolant;
+    use crate::regression::solver::{Solver, System};
+    use crate::regression::sums::regularization::Regularization;
     use crate::testing::{circle, fibonacci_sphere};
 
     #[test]

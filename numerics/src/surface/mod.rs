@@ -3,26 +3,23 @@
 pub mod degeneracy;
 pub mod geometry;
 pub mod local;
-pub mod mesh;
-pub mod operators;
 pub mod price;
 pub mod served;
 pub mod signature;
 
-mod curvature;
-mod orientation;
+pub(crate) mod curvature;
 mod request;
 
-use super::error::{NumericsError, Quantity, Result, SolverKind};
-use super::function::interpolant::Interpolant;
-use super::observer::Observer;
+use crate::error::{NumericsError, Quantity, Result, SolverKind};
 use crate::machine::vector::dot;
+use crate::observer::Observer;
+use crate::orientation::{SurfaceOrientation, tiles};
 use crate::points::cloud::Cloud;
 use crate::points::neighbours::{Neighbour, Neighbours};
 use crate::points::sampling::{SPACING_NEIGHBOURS, Sampling};
+use crate::regression::function::interpolant::Interpolant;
 use geometry::GeometryRequest;
 use local::LocalSurface;
-pub use orientation::{SurfaceOrientation, tiles};
 use served::Served;
 use signature::SignatureSurface;
 

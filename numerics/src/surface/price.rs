@@ -9,8 +9,8 @@ use crate::points::duplicates::merging_flops;
 use crate::points::quadric::{n_coefficients, n_quadric_neighbours};
 use crate::points::sampling::{sampling_flops, sampling_price};
 use crate::points::thinning::n_coarse;
-use crate::solver::price::FactorPrice;
-use crate::sums::price::pair_flops;
+use crate::regression::solver::price::FactorPrice;
+use crate::regression::sums::price::pair_flops;
 
 /// Number of queries at which one request may use the offset model. This is as much work as a factorization
 /// of 8,500 points.
@@ -125,12 +125,12 @@ pub(crate) fn local_geometry_price(sizes: Sizes) -> Price {
 
 /// Count of numbers held for the geometry at a query: two jets, normal, curvatures, directions, reports on
 /// it, and its neighbours.
-pub(super) fn numbers_at_query(dimension: usize) -> usize {
+pub(crate) fn numbers_at_query(dimension: usize) -> usize {
     20 + 6 * dimension * dimension + 2 * n_quadric_neighbours(dimension)
 }
 
 /// Flops of the geometry of a signature function at queries.
-pub(super) fn geometry_flops(asked: AskedOfSurface, sizes: Sizes) -> f64 {
+pub(crate) fn geometry_flops(asked: AskedOfSurface, sizes: Sizes) -> f64 {
     let ([n, queries, d], Sizes { n_points, n_queries, dimension }) = (sizes.as_f64(), sizes);
     let quadrics = if asked.has_own_quadrics { quadric_flops(n_points, dimension) } else { 0.0 };
     let regressions = choosing_flops(n_points, dimension) + queries * regression_flops(dimension);
@@ -155,7 +155,7 @@ const MAX_REGRESSING_THREADS: usize = 64;
 ///
 /// These are the numbers of the regressions, the normals and shapes that come with them, and the memory of
 /// threads that make them.
-pub(super) fn deviation_numbers(asked: AskedOfSurface, sizes: Sizes) -> usize {
+pub(crate) fn deviation_numbers(asked: AskedOfSurface, sizes: Sizes) -> usize {
     let Sizes { n_queries, dimension, .. } = sizes;
     if !asked.has_deviations {
         return 0;

@@ -5,15 +5,15 @@
 use std::sync::Arc;
 
 use gramian_numerics::error::NumericsError;
-use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::kernel::defaults::{Purpose, default_fit};
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::noise::estimate_noise;
 use gramian_numerics::points::sampling::Sampling;
-use gramian_numerics::solver::{Solver, System};
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::function::interpolant::Interpolant;
+use gramian_numerics::regression::solver::{Solver, System};
+use gramian_numerics::regression::sums::regularization::Regularization;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
 

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::solver::Method;
+use gramian_numerics::regression::solver::Method;
 
 use crate::support::*;
 

@@ -3,15 +3,15 @@
 
 use std::sync::Arc;
 
-use gramian_numerics::function::interpolant::Interpolant;
-use gramian_numerics::function::posterior::{covariance, log_marginal_likelihood, variances};
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
+use gramian_numerics::operators::Operator;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::solver::trend::Mean;
-use gramian_numerics::solver::{Method, Solver};
-use gramian_numerics::sums::jets::JetOrder;
-use gramian_numerics::surface::operators::Operator;
+use gramian_numerics::regression::function::interpolant::Interpolant;
+use gramian_numerics::regression::function::posterior::{covariance, log_marginal_likelihood, variances};
+use gramian_numerics::regression::solver::trend::Mean;
+use gramian_numerics::regression::solver::{Method, Solver};
+use gramian_numerics::regression::sums::jets::JetOrder;
 use serde_json::Value;
 
 use crate::support::{jets as fit_jets, *};

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::kernel::Family;
 use gramian_numerics::observer::Unobserved;
-use gramian_numerics::solver::{Method, Solver, System};
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::function::interpolant::Interpolant;
+use gramian_numerics::regression::solver::{Method, Solver, System};
+use gramian_numerics::regression::sums::regularization::Regularization;
 
 use crate::support::*;
 

@@ -1,10 +1,10 @@
 //! Clouds far from the origin, tiny and huge ones: only coordinate differences relative to ℓ matter.
 
-use gramian_numerics::function::posterior::variances;
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
+use gramian_numerics::operators::Operator;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::surface::operators::Operator;
+use gramian_numerics::regression::function::posterior::variances;
 
 use crate::support::*;
 

@@ -1,11 +1,11 @@
 //! The remedy `minimum_alpha`: with it Cholesky succeeds, and answers that need its factor are given.
 
 use gramian_numerics::error::{NotDefinite, NumericsError};
-use gramian_numerics::function::posterior::{log_marginal_likelihood, variances};
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::solver::Method;
+use gramian_numerics::regression::function::posterior::{log_marginal_likelihood, variances};
+use gramian_numerics::regression::solver::Method;
 
 use crate::support::*;
 

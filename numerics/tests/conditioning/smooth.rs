@@ -6,8 +6,8 @@ use std::f64::consts::PI;
 use gramian_numerics::kernel::Family;
 use gramian_numerics::model::price::system_price;
 use gramian_numerics::observer::Unobserved;
-use gramian_numerics::solver::Method;
-use gramian_numerics::surface::operators::Operator;
+use gramian_numerics::operators::Operator;
+use gramian_numerics::regression::solver::Method;
 
 use crate::support::*;
 

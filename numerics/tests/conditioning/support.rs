@@ -1,10 +1,10 @@
 //! Clouds and comparisons shared by the tests of conditioning.
 
-use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::kernel::{Family, WendlandSmoothness};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::sums::jets::JetOrder;
+use gramian_numerics::regression::function::interpolant::Interpolant;
+use gramian_numerics::regression::sums::jets::JetOrder;
 
 pub use crate::common::clouds::{
     cloud, fibonacci_sphere, random_cube, random_sphere, rows, stretched, wave, waves,

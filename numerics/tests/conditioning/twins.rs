@@ -4,12 +4,12 @@
 //! `2c δ^s`: 1e-9 for a kink (s = 1), but 1e-18, below rounding, for all others (s = 2).
 
 use gramian_numerics::error::{NotDefinite, NumericsError};
-use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::solver::Method;
-use gramian_numerics::sums::jets::JetOrder;
+use gramian_numerics::regression::function::interpolant::Interpolant;
+use gramian_numerics::regression::solver::Method;
+use gramian_numerics::regression::sums::jets::JetOrder;
 
 use crate::support::*;
 

@@ -3,19 +3,19 @@
 
 use std::sync::Arc;
 
-use gramian_numerics::function::deviations::JetDeviations;
-use gramian_numerics::function::interpolant::Interpolant;
-use gramian_numerics::function::local_kriging::{KrigingRequest, LocalKriging};
-use gramian_numerics::function::posterior::variances;
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
-use gramian_numerics::selection::{Noise, Observed, learn_mean};
-use gramian_numerics::solver::trend::Mean;
-use gramian_numerics::solver::{Solver, System};
-use gramian_numerics::sums::jets::JetOrder;
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::function::deviations::JetDeviations;
+use gramian_numerics::regression::function::interpolant::Interpolant;
+use gramian_numerics::regression::function::local_kriging::{KrigingRequest, LocalKriging};
+use gramian_numerics::regression::function::posterior::variances;
+use gramian_numerics::regression::selection::{Noise, Observed, learn_mean};
+use gramian_numerics::regression::solver::trend::Mean;
+use gramian_numerics::regression::solver::{Solver, System};
+use gramian_numerics::regression::sums::jets::JetOrder;
+use gramian_numerics::regression::sums::regularization::Regularization;
 
 use crate::common::clouds::random_cube;
 use crate::common::random::Random;

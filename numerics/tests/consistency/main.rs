@@ -6,8 +6,8 @@
 //! another order, so that no two numbers come from the same operations.
 //!
 //! The local solver is not listed, because it has no single function to evaluate here. On a cloud of its
-//! neighbours alone it gives the dense answers for every kernel (src/function/local_kriging/tests.rs). Its
-//! error on larger clouds is tested in moving.rs.
+//! neighbours alone it gives the dense answers for every kernel
+//! (src/regression/function/local_kriging/tests.rs). Its error on larger clouds is tested in moving.rs.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -22,8 +22,8 @@ use gramian_numerics::error::NumericsError;
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::solver::{Solver, System};
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::solver::{Solver, System};
+use gramian_numerics::regression::sums::regularization::Regularization;
 use verbs::{Setting, VERBS};
 
 /// A solver, the difference from the dense answers allowed beyond rounding, and the verbs that it refuses.

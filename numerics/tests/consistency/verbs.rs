@@ -3,16 +3,16 @@
 use std::sync::Arc;
 
 use gramian_numerics::error::NumericsError;
-use gramian_numerics::function::interpolant::Interpolant;
-use gramian_numerics::function::posterior::{covariance, log_marginal_likelihood, variances};
 use gramian_numerics::observer::Unobserved;
+use gramian_numerics::operators::Operator;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::solver::Solver;
-use gramian_numerics::solver::trend::Mean;
-use gramian_numerics::sums::jets::{JetOrder, Jets};
+use gramian_numerics::regression::function::interpolant::Interpolant;
+use gramian_numerics::regression::function::posterior::{covariance, log_marginal_likelihood, variances};
+use gramian_numerics::regression::solver::Solver;
+use gramian_numerics::regression::solver::trend::Mean;
+use gramian_numerics::regression::sums::jets::{JetOrder, Jets};
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{Curvatures, Geometry, GeometryRequest, SurfaceModel};
-use gramian_numerics::surface::operators::Operator;
 
 /// A solver, and values at its points.
 pub struct Setting {

@@ -1,7 +1,7 @@
 //! Normals of closed surfaces: they are right, or flagged.
 
-use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::observer::Unobserved;
+use gramian_numerics::regression::function::interpolant::Interpolant;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
 

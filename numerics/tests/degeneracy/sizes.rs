@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
+use gramian_numerics::regression::function::interpolant::Interpolant;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
 use gramian_numerics::surface::local::{Given, LocalSurface};

@@ -10,14 +10,14 @@ use common::random::Random;
 use gramian_numerics::error::NumericsError;
 use gramian_numerics::kernel::Family;
 use gramian_numerics::kernel::defaults::Purpose;
+use gramian_numerics::mesh::field::{Feet, Field};
+use gramian_numerics::mesh::fields::interpolant::LevelOf;
+use gramian_numerics::mesh::surface::{MeshOptions, mesh_of_level, mesh_of_surface};
+use gramian_numerics::mesh::{Bounds, LevelSetRequest, Quality, Support, level_set};
 use gramian_numerics::observer::{Observer, Unobserved};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, Orientation, SurfaceModel};
-use gramian_numerics::surface::mesh::field::{Feet, Field};
-use gramian_numerics::surface::mesh::fields::interpolant::LevelOf;
-use gramian_numerics::surface::mesh::surface::{MeshOptions, mesh_of_level, mesh_of_surface};
-use gramian_numerics::surface::mesh::{Bounds, LevelSetRequest, Quality, Support, level_set};
 use support::{OPTIONS, angles, assert_is_manifold, bunny, local, meshed, spacing_of, volume};
 
 const WITH_DEVIATIONS: GeometryRequest = GeometryRequest {

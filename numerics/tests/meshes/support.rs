@@ -3,13 +3,13 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use gramian_numerics::mesh::surface::{MeshOptions, mesh_of_surface};
+use gramian_numerics::mesh::{Closedness, LevelSet, Mesh, Quality};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::local::{Given, LocalSurface};
-use gramian_numerics::surface::mesh::surface::{MeshOptions, mesh_of_surface};
-use gramian_numerics::surface::mesh::{Closedness, LevelSet, Mesh, Quality};
 
 pub const OPTIONS: MeshOptions =
     MeshOptions { step: None, bounds: None, quality: Quality::Regular, is_open: false, max_nodes: 2_000_000 };

@@ -1,15 +1,15 @@
 //! Calls of the experiments into the library.
 
-use gramian_numerics::function::interpolant::Interpolant;
-use gramian_numerics::function::posterior;
 pub use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
+use gramian_numerics::operators;
 pub use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::sums::jets::{JetOrder, Jets};
+use gramian_numerics::regression::function::interpolant::Interpolant;
+use gramian_numerics::regression::function::posterior;
+use gramian_numerics::regression::sums::jets::{JetOrder, Jets};
 use gramian_numerics::surface;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
 pub use gramian_numerics::surface::geometry::{Orientation, SurfaceModel};
-use gramian_numerics::surface::operators;
 
 pub use super::common::clouds::cloud;
 use super::common::fits::{self, factorize, fit};

@@ -2,18 +2,18 @@
 
 use std::sync::Arc;
 
-use gramian_numerics::function::deviations::JetDeviations;
-use gramian_numerics::function::local_kriging::{KrigingRequest, LocalKriging};
-use gramian_numerics::function::posterior::{covariance, variances};
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
+use gramian_numerics::operators::Operator;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
-use gramian_numerics::solver::System;
-use gramian_numerics::solver::trend::Mean;
-use gramian_numerics::sums::jets::{JetOrder, Jets};
-use gramian_numerics::sums::regularization::Regularization;
-use gramian_numerics::surface::operators::Operator;
+use gramian_numerics::regression::function::deviations::JetDeviations;
+use gramian_numerics::regression::function::local_kriging::{KrigingRequest, LocalKriging};
+use gramian_numerics::regression::function::posterior::{covariance, variances};
+use gramian_numerics::regression::solver::System;
+use gramian_numerics::regression::solver::trend::Mean;
+use gramian_numerics::regression::sums::jets::{JetOrder, Jets};
+use gramian_numerics::regression::sums::regularization::Regularization;
 
 use crate::common::clouds::{fibonacci_sphere, random_cube, stretched, waves};
 use crate::common::fits::{factorize, fit, geometry};

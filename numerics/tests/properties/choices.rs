@@ -7,8 +7,8 @@ use gramian_numerics::observer::Unobserved;
 use gramian_numerics::patches::{PatchGeometry, Patches};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
-use gramian_numerics::selection::{Learned, Noise, Observed, learn};
-use gramian_numerics::solver::trend::Mean;
+use gramian_numerics::regression::selection::{Learned, Noise, Observed, learn};
+use gramian_numerics::regression::solver::trend::Mean;
 use gramian_numerics::surface::local::{Given, Learning, LocalSurface};
 
 use crate::common::random::Random;

@@ -1,11 +1,11 @@
 //! Fits: interpolation, the proposition on regularization, derivatives, and the Gaussian process.
 
-use gramian_numerics::function::interpolant::Interpolant;
-use gramian_numerics::function::posterior::{covariance, log_marginal_likelihood, variances};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::solver::{Method, Solver};
-use gramian_numerics::sums::jets::{JetOrder, Jets};
+use gramian_numerics::regression::function::interpolant::Interpolant;
+use gramian_numerics::regression::function::posterior::{covariance, log_marginal_likelihood, variances};
+use gramian_numerics::regression::solver::{Method, Solver};
+use gramian_numerics::regression::sums::jets::{JetOrder, Jets};
 
 use crate::common::clouds::{fibonacci_sphere, random_cube, waves};
 use crate::common::fits::{factorize, fit};

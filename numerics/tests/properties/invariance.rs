@@ -3,13 +3,13 @@
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-use gramian_numerics::function::posterior::variances;
 use gramian_numerics::kernel::Kernel;
 use gramian_numerics::observer::Unobserved;
+use gramian_numerics::operators::Operator;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::solver::trend::Mean;
-use gramian_numerics::sums::jets::JetOrder;
-use gramian_numerics::surface::operators::Operator;
+use gramian_numerics::regression::function::posterior::variances;
+use gramian_numerics::regression::solver::trend::Mean;
+use gramian_numerics::regression::sums::jets::JetOrder;
 
 use crate::common::clouds::{circle, fibonacci_sphere, stretched, turned_circle, waves};
 use crate::common::fits::{factorize, fit, geometry};

@@ -3,15 +3,15 @@
 
 use std::sync::Arc;
 
-use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::kernel::{Family, WendlandSmoothness};
 use gramian_numerics::observer::Unobserved;
+use gramian_numerics::operators::Operator;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::solver::Solver;
-use gramian_numerics::solver::trend::Mean;
-use gramian_numerics::sums::jets::JetOrder;
+use gramian_numerics::regression::function::interpolant::Interpolant;
+use gramian_numerics::regression::solver::Solver;
+use gramian_numerics::regression::solver::trend::Mean;
+use gramian_numerics::regression::sums::jets::JetOrder;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, Orientation, SurfaceModel};
-use gramian_numerics::surface::operators::Operator;
 
 use crate::common::clouds::{circle, fibonacci_sphere, stretched, turned_circle};
 use crate::common::fits::{factorize, fit, geometry, surface};

@@ -3,8 +3,8 @@
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::solver::Solver;
-use gramian_numerics::sums::jets::{JetOrder, Jets};
+use gramian_numerics::regression::solver::Solver;
+use gramian_numerics::regression::sums::jets::{JetOrder, Jets};
 
 pub use crate::common::kernels::all_families as families;
 

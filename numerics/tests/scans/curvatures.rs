@@ -2,8 +2,8 @@
 
 use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::observer::Unobserved;
+use gramian_numerics::operators::Operator;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::surface::operators::Operator;
 
 use crate::common::clouds::{fibonacci_sphere, random_sphere, random_torus};
 use crate::common::fits::fit;

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use faer::Mat;
 use gramian_numerics::observer::Unobserved;
+use gramian_numerics::operators::{Operator, RowKind, Stencils};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
 use gramian_numerics::surface::local::{Given, LocalSurface};
-use gramian_numerics::surface::operators::{Operator, RowKind, Stencils};
 
 use crate::bunny::bunny;
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::solver::Solver;
+use gramian_numerics::regression::solver::Solver;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
 
 use crate::common::fits::{default_kernel_and_alpha, factorize, surface};

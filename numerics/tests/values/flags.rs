@@ -6,20 +6,20 @@
 use std::sync::Arc;
 
 use gramian_numerics::error::NumericsError;
-use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::kernel::defaults::{Purpose, default_fit};
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
+use gramian_numerics::operators::{Judged, Operator};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::noise::estimate_noise;
 use gramian_numerics::points::sampling::Sampling as Spacings;
-use gramian_numerics::selection::{Learned, Noise, Observed, learn};
-use gramian_numerics::solver::trend::Mean;
-use gramian_numerics::solver::{Solver, System};
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::function::interpolant::Interpolant;
+use gramian_numerics::regression::selection::{Learned, Noise, Observed, learn};
+use gramian_numerics::regression::solver::trend::Mean;
+use gramian_numerics::regression::solver::{Solver, System};
+use gramian_numerics::regression::sums::regularization::Regularization;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
-use gramian_numerics::surface::operators::{Judged, Operator};
 
 use crate::common::random::Random;
 use crate::fields::Field;

@@ -5,19 +5,19 @@
 
 use std::sync::Arc;
 
-use gramian_numerics::function::local_kriging::LocalKriging;
 use gramian_numerics::kernel::Kernel;
 use gramian_numerics::observer::Unobserved;
+use gramian_numerics::operators::{Kriged, OfKriged, Operator};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling as Spacings;
-use gramian_numerics::selection::{Learned, Noise, Observed, learn};
-use gramian_numerics::solver::System;
-use gramian_numerics::solver::trend::Mean;
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::function::local_kriging::LocalKriging;
+use gramian_numerics::regression::selection::{Learned, Noise, Observed, learn};
+use gramian_numerics::regression::solver::System;
+use gramian_numerics::regression::solver::trend::Mean;
+use gramian_numerics::regression::sums::regularization::Regularization;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
 use gramian_numerics::surface::local::{Given, LocalSurface};
-use gramian_numerics::surface::operators::{Kriged, OfKriged, Operator};
 
 use crate::common::random::Random;
 use crate::fields::Field;

@@ -4,20 +4,20 @@
 
 use std::sync::Arc;
 
-use gramian_numerics::function::interpolant::Interpolant;
-use gramian_numerics::function::posterior::variances_with_mean;
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling as Spacings;
-use gramian_numerics::selection::{
+use gramian_numerics::regression::function::interpolant::Interpolant;
+use gramian_numerics::regression::function::posterior::variances_with_mean;
+use gramian_numerics::regression::selection::{
     Criterion, Hyperparameters, MAX_EVALUATIONS, Noise, Observations, Observed, Parameter, Selection,
     Variation, learn, select,
 };
-use gramian_numerics::solver::trend::Mean;
-use gramian_numerics::solver::{Solver, System};
-use gramian_numerics::sums::jets::JetOrder;
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::solver::trend::Mean;
+use gramian_numerics::regression::solver::{Solver, System};
+use gramian_numerics::regression::sums::jets::JetOrder;
+use gramian_numerics::regression::sums::regularization::Regularization;
 
 use crate::common::random::Random;
 use crate::fields::Field;

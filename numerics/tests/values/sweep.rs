@@ -4,21 +4,21 @@
 
 use std::sync::Arc;
 
-use gramian_numerics::function::deviations::JetDeviations;
-use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::kernel::Kernel;
 use gramian_numerics::observer::Unobserved;
+use gramian_numerics::operators::Operator;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling as Spacings;
-use gramian_numerics::selection::{Learned, Noise, Observed, learn};
-use gramian_numerics::solver::trend::Mean;
-use gramian_numerics::solver::{Solver, System};
-use gramian_numerics::sums::jets::JetOrder;
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::function::deviations::JetDeviations;
+use gramian_numerics::regression::function::interpolant::Interpolant;
+use gramian_numerics::regression::selection::{Learned, Noise, Observed, learn};
+use gramian_numerics::regression::solver::trend::Mean;
+use gramian_numerics::regression::solver::{Solver, System};
+use gramian_numerics::regression::sums::jets::JetOrder;
+use gramian_numerics::regression::sums::regularization::Regularization;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
 use gramian_numerics::surface::local::{Given, LocalSurface};
-use gramian_numerics::surface::operators::Operator;
 
 use crate::common::random::Random;
 use crate::fields::Field;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use gramian_numerics::solver::trend::Mean;
+use gramian_numerics::regression::solver::trend::Mean;
 
 /// The method that solves the linear system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]

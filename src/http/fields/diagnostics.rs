@@ -8,8 +8,8 @@ use super::kernel::KernelUsed;
 use super::schemas::CloudIdSchema;
 use gramian_host::json_members;
 use gramian_numerics::error::SolverKind;
-use gramian_numerics::solver::{Disagreement, Outlier, Place};
-use gramian_numerics::surface::operators::{RowKind, Stencils};
+use gramian_numerics::operators::{RowKind, Stencils};
+use gramian_numerics::regression::solver::{Disagreement, Outlier, Place};
 
 /// The factorization of the Gram matrix.
 ///

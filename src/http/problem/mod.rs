@@ -7,13 +7,13 @@ pub use gramian_host::problem::{FieldError, Problem};
 use gramian_numerics::error::{NotDefinite, NumericsError};
 
 /// All types of problems that the service answers with.
-pub fn all() -> impl Iterator<Item = Slug> {
-    gramian_host::problem::catalogue::ALL.into_iter().chain(catalogue::ALL)
+pub fn all() -> Vec<Slug> {
+    [&gramian_host::problem::catalogue::ALL[..], &catalogue::ALL].concat()
 }
 
 /// Finds a type of problem by the last segment of its `type`.
 pub fn named(name: &str) -> Option<Slug> {
-    all().find(|slug| slug.as_str() == name)
+    all().into_iter().find(|slug| slug.as_str() == name)
 }
 
 /// Most points listed in `point_indices`: bounded, but enough to see the pattern.

@@ -9,13 +9,13 @@ use crate::store::key::ValuesKey;
 use crate::store::prepared::PreparedFit;
 use gramian_host::compute::JobObserver;
 use gramian_numerics::error::NumericsError;
-use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::model::{FittedValues, Model};
 use gramian_numerics::observer::WithoutStages;
 use gramian_numerics::points::sampling::Sampling;
-use gramian_numerics::selection::{Learned, Noise, Observed, learn};
-use gramian_numerics::solver::trend::Mean;
-use gramian_numerics::solver::{Known, Solution};
+use gramian_numerics::regression::function::interpolant::Interpolant;
+use gramian_numerics::regression::selection::{Learned, Noise, Observed, learn};
+use gramian_numerics::regression::solver::trend::Mean;
+use gramian_numerics::regression::solver::{Known, Solution};
 use gramian_numerics::surface::Surface;
 
 /// The fits of one request.

@@ -17,7 +17,7 @@ use gramian_host::operation::{AnswerHeaders, Outlook};
 use gramian_numerics::model::price::MakingPrice;
 use gramian_numerics::model::{Making, Model, SurfaceMaking};
 use gramian_numerics::points::sampling::Sampling;
-use gramian_numerics::solver::Workspace;
+use gramian_numerics::regression::solver::Workspace;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::local::Given;
 

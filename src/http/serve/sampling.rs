@@ -11,7 +11,7 @@ use gramian_host::compute::{Admission, JobObserver};
 use gramian_numerics::error::NumericsError;
 use gramian_numerics::points::noise::{estimate_noise, noise_flops};
 use gramian_numerics::points::sampling::{Sampling, sampling_flops};
-use gramian_numerics::selection::{Learned, learning_price};
+use gramian_numerics::regression::selection::{Learned, learning_price};
 
 /// Finds the facts about cloud or values that a fit lacks.
 ///

@@ -71,7 +71,7 @@ impl App {
         let guest = Guest {
             shares: memory.shares,
             lists: Limits::of(&config).lists(),
-            problems: problem::all().collect(),
+            problems: problem::all(),
             subject: Some(Subject {
                 header: CLOUD_HEADER,
                 path: "/v1/clouds/",

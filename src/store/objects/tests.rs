@@ -213,7 +213,6 @@ async fn files_that_were_never_whole_go_after_an_hour() {
     let directory = std::env::temp_dir().join(format!("gramian-half-written-{}", std::process::id()));
     let objects = Objects::open(&Place::Directory(directory.clone()), []).await.unwrap();
     let objects = CloudObjects(Arc::new(objects));
-    let objects = CloudObjects(Arc::new(objects));
     let folder = directory.join("one/clouds");
     std::fs::create_dir_all(&folder).unwrap();
     for name in ["ab#1", "ab#x", "ab"] {

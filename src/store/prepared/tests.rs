@@ -8,13 +8,13 @@ use gramian_numerics::model::Recipe;
 use gramian_numerics::model::price::system_price;
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::solver::System;
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::solver::System;
+use gramian_numerics::regression::sums::regularization::Regularization;
 
 type Store = PreparedStore<&'static str>;
 
 fn store(budget: usize) -> Store {
-    Store::new(PreparedBytes { kept: budget, spare: 0, budget, n_owners: 1 })
+    Store::new(PreparedBytes { kept: budget, spare: 0 }, Budget::new(budget, 1))
 }
 
 fn key(alpha: f64) -> FitKey {
@@ -76,8 +76,7 @@ async fn without_memory_nothing_is_begun() {
 #[tokio::test]
 async fn factors_beyond_the_budget_are_computed_each_time() {
     // 100 points take half of 100² numbers, 40 KB, and the budget of factors keeps 15 parts of 16.
-    let bytes = PreparedBytes { kept: 32 << 10, spare: 0, budget: 1 << 20, n_owners: 1 };
-    let store = Store::new(bytes);
+    let store = Store::new(PreparedBytes { kept: 32 << 10, spare: 0 }, Budget::new(1 << 20, 1));
     assert_eq!(outcome_of(&store, 1.0, 100).await, CacheOutcome::NotStored);
     assert_eq!(outcome_of(&store, 1.0, 100).await, CacheOutcome::NotStored);
     assert_eq!((store.n_bytes(), store.n_reserved()), (0, 0));

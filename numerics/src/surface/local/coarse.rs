@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use super::runs::Runs;
 use crate::error::NumericsError;
-use crate::function::interpolant::Interpolant;
 use crate::kernel::Kernel;
 use crate::kernel::defaults::{Purpose, default_fit};
 use crate::observer::Observer;
@@ -12,9 +11,10 @@ use crate::points::cloud::Cloud;
 use crate::points::duplicates::Merge;
 use crate::points::sampling::Sampling;
 use crate::points::thinning::{n_coarse, thinned_points};
-use crate::solver::{Solver, System};
-use crate::sums::jets::JetOrder;
-use crate::sums::regularization::Regularization;
+use crate::regression::function::interpolant::Interpolant;
+use crate::regression::solver::{Solver, System};
+use crate::regression::sums::jets::JetOrder;
+use crate::regression::sums::regularization::Regularization;
 
 /// Distance over which gradients of the signature function are continued, in spacings of the coarse cloud.
 /// The kernel bends over three of them.

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::machine::small::{Small, zeros};
 use crate::observer::{Observer, for_each};
 use crate::points::cloud::{Cloud, squared_distance};
-use crate::sums::jets::Jets;
+use crate::regression::sums::jets::Jets;
 
 /// Points of ranges that are looked at between two checkpoints: some milliseconds.
 const CHECKED_AT_ONCE: usize = 1 << 18;

@@ -5,12 +5,12 @@ use super::function::Signature;
 use crate::error::Result;
 use crate::machine::vector::norm;
 use crate::observer::Observer;
+use crate::orientation::Directions;
 use crate::points::cloud::Cloud;
 use crate::points::local_quadrics::LocalQuadrics;
 use crate::points::sampling::Sampling;
-use crate::sums::jets::{JetOrder, Jets};
+use crate::regression::sums::jets::{JetOrder, Jets};
 use crate::surface::degeneracy::lacks_normal;
-use crate::surface::orientation::Directions;
 
 /// Step of the difference quotient along a local normal, in spacings, for kernels without a gradient at the
 /// points.
@@ -19,7 +19,7 @@ const DIFFERENCE_STEP: f64 = 0.25;
 /// Computes unit normals at the points, signed where the signature function tells the side.
 ///
 /// # Errors
-/// Returns the errors of [`crate::function::interpolant::Interpolant::at`].
+/// Returns the errors of [`crate::regression::function::interpolant::Interpolant::at`].
 pub(crate) fn directions(
     signature: &Signature,
     sampling: &Sampling,

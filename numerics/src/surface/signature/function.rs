@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use crate::error::Result;
-use crate::function::interpolant::Interpolant;
 use crate::machine::heap::vec_bytes;
 use crate::observer::Observer;
-use crate::solver::{Solution, Solver, Sought};
-use crate::sums::jets::{JetOrder, Jets};
+use crate::regression::function::interpolant::Interpolant;
+use crate::regression::solver::{Solution, Solver, Sought};
+use crate::regression::sums::jets::{JetOrder, Jets};
 use crate::surface::degeneracy::roundings;
 
 /// The paper's signature function u_X, the fit of the constant 1, with its values and derivatives at the

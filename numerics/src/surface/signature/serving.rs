@@ -18,7 +18,7 @@ use crate::points::local_quadrics::{LocalQuadric, LocalQuadrics};
 use crate::points::neighbourhoods::Neighbourhoods;
 use crate::points::neighbours::Neighbour;
 use crate::points::quadric::n_quadric_neighbours;
-use crate::sums::jets::{JetOrder, Jets};
+use crate::regression::sums::jets::{JetOrder, Jets};
 use crate::surface::curvature::principal_curvatures;
 use crate::surface::degeneracy::{DegeneracyReason, is_far, is_weak, lacks_normal, roundings};
 use crate::surface::request::{GeometryRequest, Orientation, SurfaceModel};
@@ -31,7 +31,7 @@ const ON_SURFACE_SPACINGS: f64 = 0.5;
 /// Computes gradient, Hessian, sign and flag at each query, with deviations if they are asked for.
 ///
 /// # Errors
-/// Returns the errors of [`crate::function::interpolant::Interpolant::at`].
+/// Returns the errors of [`crate::regression::function::interpolant::Interpolant::at`].
 pub(crate) fn serve(
     surface: &SignatureSurface,
     queries: &Cloud,

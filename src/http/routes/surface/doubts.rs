@@ -5,7 +5,7 @@ use crate::http::problem::Problem;
 use crate::http::serve::answers::surface::SurfaceGeometry;
 use crate::http::serve::fitted::Fits;
 use gramian_host::compute::JobObserver;
-use gramian_numerics::surface::operators::{Judged, Operator};
+use gramian_numerics::operators::{Judged, Operator};
 
 /// Answers of an operator that may be doubtful.
 pub struct Doubted<'a> {

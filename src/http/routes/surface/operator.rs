@@ -18,17 +18,17 @@ use gramian_host::compute::JobObserver;
 use gramian_host::wire::read::points::Points;
 use gramian_host::wire::write::array::Array;
 use gramian_host::wire::write::integers::Integers;
-use gramian_numerics::function::local_kriging::LocalKriging;
 use gramian_numerics::machine::price::Sizes;
 use gramian_numerics::model::Report;
 use gramian_numerics::model::price::{OperatorAsked, operator_price};
+use gramian_numerics::operators::price::{matrix_price, n_entries_per_row, stencils_price};
+use gramian_numerics::operators::{Judged, Kriged, OfKriged, Operator, SparseMatrix};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::neighbours::Neighbours;
 use gramian_numerics::points::sampling::{Sampling, sampling_price};
-use gramian_numerics::selection::learning_price;
+use gramian_numerics::regression::function::local_kriging::LocalKriging;
+use gramian_numerics::regression::selection::learning_price;
 use gramian_numerics::surface::geometry::GeometryRequest;
-use gramian_numerics::surface::operators::price::{matrix_price, n_entries_per_row, stencils_price};
-use gramian_numerics::surface::operators::{Judged, Kriged, OfKriged, Operator, SparseMatrix};
 
 /// A checked request to apply an operator to values.
 pub struct AppliedWork {

@@ -16,7 +16,7 @@ use gramian_host::wire::negotiation::Format;
 use gramian_host::wire::read::points::Points;
 use gramian_host::wire::write::array::Array;
 use gramian_host::wire::write::integers::Integers;
-use gramian_numerics::surface::operators::Operator;
+use gramian_numerics::operators::Operator;
 
 const OPERATOR: Operator = Operator::SurfaceGradient;
 

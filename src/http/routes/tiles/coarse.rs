@@ -18,7 +18,7 @@ use gramian_host::compute::JobObserver;
 use gramian_host::memory::Owner;
 use gramian_host::wire::read::points::Points;
 use gramian_numerics::machine::price::Price;
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::sums::regularization::Regularization;
 use gramian_numerics::surface::local::coarse::CoarseCloud;
 use gramian_numerics::surface::price::coarse_price;
 

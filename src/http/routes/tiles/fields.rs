@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use gramian_numerics::surface::tiles;
+use gramian_numerics::orientation::tiles;
 
 /// Neighbouring points of a tile whose normals agree, with sums over those that the tile answers for.
 ///

@@ -16,10 +16,10 @@ use gramian_host::compute::JobObserver;
 use gramian_host::wire::write::integers::Integers;
 use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::model::Report;
+use gramian_numerics::orientation::tiles::Tile;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::surface::geometry::{GeometryRequest, SurfaceModel};
 use gramian_numerics::surface::price::regions_price;
-use gramian_numerics::surface::tiles::Tile;
 
 request! {
     /// A tile: a part of a cloud with the points around it, regressed locally.

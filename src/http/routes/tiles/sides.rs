@@ -17,7 +17,7 @@ use crate::http::state::app::App;
 use gramian_host::compute::JobObserver;
 use gramian_host::memory::Owner;
 use gramian_numerics::machine::price::Price;
-use gramian_numerics::surface::tiles::{self, Tiling, TilingSize};
+use gramian_numerics::orientation::tiles::{self, Tiling, TilingSize};
 
 /// The regions of all tiles of a cloud, and which of them are parts of one region.
 #[derive(Debug, Deserialize, ToSchema)]

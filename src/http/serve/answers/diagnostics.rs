@@ -6,9 +6,9 @@ use crate::http::fields::{
 use crate::http::serve::fitted::FitModel;
 use crate::http::serve::plan::words;
 use gramian_numerics::model::Report;
-use gramian_numerics::solver::trend::Trend;
-use gramian_numerics::solver::{Disagreement, Method, Outlier};
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::solver::trend::Trend;
+use gramian_numerics::regression::solver::{Disagreement, Method, Outlier};
+use gramian_numerics::regression::sums::regularization::Regularization;
 
 /// Reciprocal condition below which fewer than three digits of the weights are certain.
 const ILL_CONDITIONED: f64 = 1e-13;

@@ -6,9 +6,9 @@ use crate::http::serve::fitted::Fits;
 use crate::http::serve::plan::Values;
 use gramian_host::compute::JobObserver;
 use gramian_host::wire::write::array::Array;
-use gramian_numerics::function::batch::Batch;
 use gramian_numerics::model::{EachAt, JetRequest, ValuesAt};
-use gramian_numerics::solver::trend::Trend;
+use gramian_numerics::regression::function::batch::Batch;
+use gramian_numerics::regression::solver::trend::Trend;
 
 impl Fits {
     /// Computes the function with these values at queries.

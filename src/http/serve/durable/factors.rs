@@ -15,7 +15,7 @@ use gramian_host::compute::Admission;
 use gramian_host::store::pieces::HASH_BYTES;
 use gramian_host::store::{Damaged, Unavailable};
 use gramian_numerics::model::Model;
-use gramian_numerics::solver::{FactorBuilder, Solver, System};
+use gramian_numerics::regression::solver::{FactorBuilder, Solver, System};
 
 /// Number of points from which a factor is stored: reading 4 n² bytes takes less time than n³/3 flops.
 const WORTH_IT: usize = 4000;

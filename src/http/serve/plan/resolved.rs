@@ -17,10 +17,10 @@ use gramian_numerics::model::price::MakingPrice;
 use gramian_numerics::observer::Observer;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::duplicates::Merge;
-use gramian_numerics::selection::Learned;
-use gramian_numerics::solver::Disagreement;
-use gramian_numerics::solver::trend::{Mean, Trend};
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::selection::Learned;
+use gramian_numerics::regression::solver::Disagreement;
+use gramian_numerics::regression::solver::trend::{Mean, Trend};
+use gramian_numerics::regression::sums::regularization::Regularization;
 
 /// A fit whose inputs are checked and whose cost is known and admitted.
 #[derive(Clone)]

@@ -9,7 +9,7 @@ use gramian_numerics::kernel::defaults::{Purpose, default_fit};
 use gramian_numerics::model::choose::AutoReason;
 use gramian_numerics::model::{Recipe, ScaledProcess};
 use gramian_numerics::observer::Observer;
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::sums::regularization::Regularization;
 use gramian_numerics::surface::local::Learning;
 
 /// A fit of a surface.

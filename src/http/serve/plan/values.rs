@@ -17,9 +17,9 @@ use gramian_numerics::model::{Recipe, ScaledProcess};
 use gramian_numerics::observer::Observer;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
-use gramian_numerics::selection::{Learned, Noise, Observed, learn, learn_mean};
-use gramian_numerics::solver::trend::Mean;
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::selection::{Learned, Noise, Observed, learn, learn_mean};
+use gramian_numerics::regression::solver::trend::Mean;
+use gramian_numerics::regression::sums::regularization::Regularization;
 
 /// Values at the points of the client's cloud, with the key of their weights.
 pub struct Values {

@@ -7,9 +7,9 @@ use crate::http::problem::{catalogue, from_numerics};
 use crate::http::serve::plan::FittedCloud;
 use gramian_host::wire::read::points::Points;
 use gramian_numerics::error::SolverKind;
-use gramian_numerics::solver::trend::Mean;
-use gramian_numerics::solver::{DEFAULT_TOLERANCE, TOLERANCES};
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::solver::trend::Mean;
+use gramian_numerics::regression::solver::{DEFAULT_TOLERANCE, TOLERANCES};
+use gramian_numerics::regression::sums::regularization::Regularization;
 
 /// A requested quantity that not every solver provides: its name, the pointer to it, and the solvers without.
 #[derive(Debug, Clone, Copy)]

@@ -16,8 +16,8 @@ use gramian_numerics::kernel::defaults::DEFAULT_ALPHA;
 use gramian_numerics::machine::price::Price;
 use gramian_numerics::model::choose::{LANDMARKS_FROM, most_landmarks};
 use gramian_numerics::observer::Observer;
-use gramian_numerics::solver::{DEFAULT_TOLERANCE, expected_landmarks, probe_price};
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::solver::{DEFAULT_TOLERANCE, expected_landmarks, probe_price};
+use gramian_numerics::regression::sums::regularization::Regularization;
 
 /// What a request fits to values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

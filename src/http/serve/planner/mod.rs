@@ -27,7 +27,7 @@ use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::model::choose::{AutoReason, UnfittedSurface, prefers_local};
 use gramian_numerics::patches::MAX_LOCAL_DIMENSION;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::solver::trend::Mean;
+use gramian_numerics::regression::solver::trend::Mean;
 use gramian_numerics::surface::geometry::{GeometryRequest, SurfaceModel};
 use gramian_numerics::surface::local::Learning;
 use inputs::length_mismatch;

@@ -10,16 +10,16 @@
 use std::sync::Arc;
 
 use crate::error::Result;
-use crate::function::interpolant::Interpolant;
 use crate::kernel::{Family, Kernel};
 use crate::machine::small::Small;
 use crate::observer::Unobserved;
 use crate::points::cloud::Cloud;
 use crate::points::patch::Patch;
 use crate::points::quadric::n_coefficients;
-use crate::solver::{Solver, System};
-use crate::sums::jets::JetOrder;
-use crate::sums::regularization::Regularization;
+use crate::regression::function::interpolant::Interpolant;
+use crate::regression::solver::{Solver, System};
+use crate::regression::sums::jets::JetOrder;
+use crate::regression::sums::regularization::Regularization;
 
 /// Neighbours per coefficient of a quadric in a patch: 42 for surfaces in space.
 const NEIGHBOURS_PER_COEFFICIENT: usize = 7;

@@ -13,15 +13,15 @@ use gramian_host::compute::JobObserver;
 use gramian_host::wire::write::array::Array;
 use gramian_host::wire::write::integers::Integers;
 use gramian_host::wire::write::model::Shape;
+use gramian_numerics::mesh::fields::interpolant::LevelOf;
+use gramian_numerics::mesh::surface::{curvatures_of_level, mesh_of_level, mesh_of_surface};
+use gramian_numerics::mesh::{Closedness, DOUBTFUL, LevelSet, Part, Support};
 use gramian_numerics::model::{JetRequest, Report};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::median;
-use gramian_numerics::sums::jets::JetOrder;
+use gramian_numerics::regression::sums::jets::JetOrder;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::Orientation;
-use gramian_numerics::surface::mesh::fields::interpolant::LevelOf;
-use gramian_numerics::surface::mesh::surface::{curvatures_of_level, mesh_of_level, mesh_of_surface};
-use gramian_numerics::surface::mesh::{Closedness, DOUBTFUL, LevelSet, Part, Support};
 
 /// Share of a level set that is left out as small parts, from which the surface itself may be lacking.
 const MUCH_DROPPED: f64 = 0.05;

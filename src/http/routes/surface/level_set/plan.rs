@@ -13,12 +13,12 @@ use crate::http::serve::planner::{GivenValues, Planner, Restricted};
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::machine::price::{Price, Sizes};
+use gramian_numerics::mesh::price::{MeshSize, Within};
+use gramian_numerics::mesh::surface::MeshOptions;
+use gramian_numerics::mesh::{Bounds, Quality};
 use gramian_numerics::model::price::{function_price, geometry_price, level_set_price};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::surface::geometry::{GeometryRequest, SurfaceModel};
-use gramian_numerics::surface::mesh::price::{MeshSize, Within};
-use gramian_numerics::surface::mesh::surface::MeshOptions;
-use gramian_numerics::surface::mesh::{Bounds, Quality};
 use gramian_numerics::surface::price::{AskedOfSurface, Offsets};
 
 /// A checked request for a mesh.

@@ -16,12 +16,12 @@ use gramian_host::answer;
 use gramian_host::compute::JobObserver;
 use gramian_host::wire::read::points::Points;
 use gramian_host::wire::write::array::Array;
-use gramian_numerics::function::deviations::JetDeviations;
 use gramian_numerics::machine::price::Sizes;
 use gramian_numerics::model::price::function_price;
 use gramian_numerics::model::{JetRequest, ValuesAt};
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::sums::jets::JetOrder;
+use gramian_numerics::regression::function::deviations::JetDeviations;
+use gramian_numerics::regression::sums::jets::JetOrder;
 
 request! {
     /// Values at the points of a cloud, and queries at which to evaluate the function through them.

@@ -17,17 +17,17 @@ use gramian_host::compute::JobObserver;
 use gramian_host::wire::write::array::Array;
 use gramian_host::wire::write::json::Nullable;
 use gramian_numerics::error::NumericsError;
-use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::kernel::{Family, Kernel, MAX_MATERN_ORDER, WendlandSmoothness};
 use gramian_numerics::machine::price::Price;
 use gramian_numerics::model::Report;
-use gramian_numerics::selection::{
+use gramian_numerics::regression::function::interpolant::Interpolant;
+use gramian_numerics::regression::selection::{
     CloudSize, Criterion, Hyperparameters, LeaveOneOut, MAX_EVALUATIONS, Observations, Parameter, SearchSize,
     Selected, Selection, Variation, alpha_path, alpha_path_price, default_alphas, expected_evaluations,
     leave_one_out_price, leave_one_out_with, select, selection_price,
 };
-use gramian_numerics::solver::trend::Trend;
-use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::regression::solver::trend::Trend;
+use gramian_numerics::regression::sums::regularization::Regularization;
 
 const BEYOND_KERNELS: &str =
     "the variance of the values is outside the range of kernels, 1e-140 to 1e140; scale the values";

@@ -14,20 +14,20 @@ use gramian_host::compute::JobObserver;
 use gramian_host::wire::read::points::Points;
 use gramian_host::wire::write::array::Array;
 use gramian_numerics::error::{NumericsError, SolverKind};
-use gramian_numerics::function::batch::BatchJets;
-use gramian_numerics::function::deviations::JetDeviations;
-use gramian_numerics::function::interpolant::Interpolant;
-use gramian_numerics::function::posterior::{
-    Covariance, Variances, covariance_with_mean, log_marginal_likelihood,
-};
-use gramian_numerics::function::samples::{Root, Stream};
 use gramian_numerics::machine::normal::{cumulative, quantile};
 use gramian_numerics::machine::price::Sizes;
 use gramian_numerics::model::price::{PosteriorAsked, posterior_price};
 use gramian_numerics::model::{EachAt, JetRequest, ValuesAt};
 use gramian_numerics::observer::Observer;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::sums::jets::JetOrder;
+use gramian_numerics::regression::function::batch::BatchJets;
+use gramian_numerics::regression::function::deviations::JetDeviations;
+use gramian_numerics::regression::function::interpolant::Interpolant;
+use gramian_numerics::regression::function::posterior::{
+    Covariance, Variances, covariance_with_mean, log_marginal_likelihood,
+};
+use gramian_numerics::regression::function::samples::{Root, Stream};
+use gramian_numerics::regression::sums::jets::JetOrder;
 
 /// Optional parts of an answer, beside the means.
 pub struct Asked {
