@@ -21,7 +21,12 @@ from pathlib import Path
 from widths import wide_lines
 
 ROOT = Path(__file__).resolve().parent.parent
-CRATES = {"gramian": ROOT / "src", "gramian_numerics": ROOT / "numerics/src"}
+CRATES = {
+    "gramian": ROOT / "src",
+    "gramian_host": ROOT / "host/src",
+    "gramian_numerics": ROOT / "numerics/src",
+    "gramian_observer": ROOT / "observer/src",
+}
 PACKAGE = ROOT / "sdk/python/src/gramian"
 MAX_DOORS = 12
 MAX_FUNCTION_LINES = 80

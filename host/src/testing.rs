@@ -22,7 +22,7 @@ pub fn lists(max_points: usize, max_queries: usize, max_width: usize) -> Lists {
         remedy: "send fewer",
     };
     let kinds = [
-        rule(&["values"], List::OTHER, max_points),
+        rule(&["values", "noise_variances"], List::OTHER, max_points),
         rule(&["points", "normals"], List::ROW, max_points),
         rule(&["queries"], List::ROW, max_queries),
     ];

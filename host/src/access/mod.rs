@@ -22,7 +22,6 @@ use arc_swap::ArcSwap;
 use subtle::{Choice, ConditionallySelectable, ConstantTimeEq};
 
 use crate::memory::Owner;
-use crate::state::settings::Settings;
 use crate::store::OwnerName;
 pub use file::generate;
 use file::{KeyEntry, KeysFile};
@@ -78,25 +77,25 @@ impl Caller {
 }
 
 impl Keys {
-    /// Reads the keys of the configuration and of the file.
+    /// Reads the keys of the configuration and of the file. Without any of them, anyone may call.
     ///
     /// # Errors
     /// Tells what is wrong with the file.
-    pub fn new(settings: &Settings) -> Result<Self, String> {
+    pub fn new(api_keys: &[String], keys_file: Option<&Path>) -> Result<Self, String> {
         let digest = |key: &String| blake3::hash(key.trim().as_bytes()).into();
-        let configured = settings.api_keys.iter().map(digest).collect();
-        let (file, digest_at_start) = match &settings.keys_file {
+        let configured = api_keys.iter().map(digest).collect();
+        let (file, digest_at_start) = match keys_file {
             Some(path) => read_file(path)?,
             None => Default::default(),
         };
         let keys = Self {
             configured,
-            file: settings.keys_file.clone(),
+            file: keys_file.map(Path::to_owned),
             digest_at_start,
             callers: ArcSwap::default(),
             views: Mutex::default(),
         };
-        if settings.is_open() {
+        if keys.is_open() {
             keys.register_view(OwnerName("everyone".to_owned()));
             return Ok(keys);
         }

@@ -1,6 +1,7 @@
 use clap::Parser;
 
 use super::*;
+use crate::state::settings::Settings;
 
 #[derive(Parser)]
 struct Flags {
@@ -10,7 +11,7 @@ struct Flags {
 
 fn keys(flags: &[&str]) -> Result<Keys, String> {
     let flags = Flags::try_parse_from(["gramian"].iter().chain(flags)).unwrap();
-    Keys::new(&flags.settings)
+    Keys::new(&flags.settings.api_keys, flags.settings.keys_file.as_deref())
 }
 
 fn owner_of(keys: &Keys, key: &str) -> Option<Owner> {

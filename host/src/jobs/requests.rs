@@ -113,8 +113,8 @@ async fn further(host: &Host, owner: Owner, id: JobId, last: &JobView) -> Option
 /// The answer of a job once it has ended: that of its request, problems included.
 ///
 /// # Errors
-/// Returns the errors of [`look`], 404 for a cancelled job, 503 if too many clients wait, and 504 if the job does
-/// not end in time.
+/// Returns the errors of [`look`], 404 for a cancelled job, 503 if too many clients wait, and 504 if the job
+/// does not end in time.
 pub async fn result(host: &Host, owner: Owner, id: JobId) -> Result<Response, Problem> {
     let first = look(host, owner, id).await?;
     // A waiting client holds its connection as long as a follower does, so it counts as one.

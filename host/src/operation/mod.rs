@@ -1,9 +1,8 @@
 //! The way of a request from its body to its answer, whatever it computes.
 //!
 //! A request is read, takes a place among threads and queue, and is parsed on the pool. It then goes on in
-//! steps ([`Step`]), of which a service defines as many as it has to await something for. Each step knows what
-//! it costs before it begins. The last one is [`Ready`]: everything is at hand, and the answer is computed and
-//! encoded by one job.
+//! steps ([`Step`]): a service has one wherever it has to await something. Each states its cost before it
+//! begins. The last one is [`Ready`]: everything is at hand, and one job computes and encodes the answer.
 //!
 //! Jobs wait for a thread, so a step goes on within the job of the step before it wherever nothing has to be
 //! awaited. A small request is answered by the job that parsed it.

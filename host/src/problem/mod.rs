@@ -146,8 +146,8 @@ impl Problem {
         Self::new(catalogue::INTERNAL, "an internal error occurred; the request id identifies it in the logs")
     }
 
-    /// 504 for work that was cancelled. The client that cancelled is gone and reads no answer. The deadline has
-    /// an answer of its own.
+    /// 504 for work that was cancelled. The client that cancelled is gone and reads no answer. The deadline
+    /// has an answer of its own.
     pub fn cancelled() -> Self {
         Self::new(catalogue::DEADLINE_EXCEEDED, "the computation was cancelled")
     }

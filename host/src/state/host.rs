@@ -92,7 +92,7 @@ impl Host {
         guest: Guest,
         store: Option<Arc<Objects>>,
     ) -> Result<Arc<Self>, StartError> {
-        let keys = Keys::new(&settings).map_err(StartError::Keys)?;
+        let keys = Keys::new(&settings.api_keys, settings.keys_file.as_deref()).map_err(StartError::Keys)?;
         let (n_owners, n_threads, max_queue) =
             (settings.n_owners(), settings.n_threads(), settings.max_queue);
         let of_jobs = JobLimits {

@@ -65,88 +65,80 @@ pub fn dimension_mismatch(pointer: impl Into<String>, expected: usize, found: us
 /// Converts an error of the numerics to a problem with type, pointer and remedy.
 pub fn from_numerics(error: NumericsError, pointers: Pointers) -> Problem {
     use NumericsError as E;
+    use catalogue::{
+        DEADLINE_EXCEEDED, DIMENSION_MISMATCH, INVALID_CLOUD, INVALID_REQUEST, KERNEL_NOT_POSITIVE_DEFINITE,
+        KERNEL_NOT_SMOOTH, LENGTH_MISMATCH, NOT_CONVERGED, OVERLOADED, UNSUPPORTED_BY_SOLVER,
+    };
     let detail = error.to_string();
     let at = |slug, pointer: &str| Problem::of_field(slug, pointer, detail.clone());
     match error {
-        E::EmptyCloud | E::ZeroDimension | E::DimensionTooSmall { .. } => {
-            at(catalogue::INVALID_CLOUD, pointers.points)
-        }
-        E::RaggedPoints { point, .. } => {
-            at(catalogue::INVALID_CLOUD, &Pointers::entry(pointers.points, point))
-        }
+        E::EmptyCloud | E::ZeroDimension | E::DimensionTooSmall { .. } => at(INVALID_CLOUD, pointers.points),
+        E::RaggedPoints { point, .. } => at(INVALID_CLOUD, &Pointers::entry(pointers.points, point)),
         E::NonFiniteCoordinate { point, coordinate } | E::CoordinateTooLarge { point, coordinate } => {
-            at(catalogue::INVALID_CLOUD, &format!("{}/{coordinate}", Pointers::entry(pointers.points, point)))
+            at(INVALID_CLOUD, &format!("{}/{coordinate}", Pointers::entry(pointers.points, point)))
         }
-        E::DimensionMismatch { .. } => at(catalogue::DIMENSION_MISMATCH, pointers.queries),
-        E::LengthMismatch { .. } => at(catalogue::LENGTH_MISMATCH, "/values"),
+        E::DimensionMismatch { .. } => at(DIMENSION_MISMATCH, pointers.queries),
+        E::LengthMismatch { .. } => at(LENGTH_MISMATCH, "/values"),
         E::InvalidKernelParameter { parameter, .. } => {
-            at(catalogue::INVALID_REQUEST, &format!("{}/{parameter}", pointers.kernel))
+            at(INVALID_REQUEST, &format!("{}/{parameter}", pointers.kernel))
         }
         E::InvalidLengthScale { axis, .. } => {
             let list = format!("{}/length_scales", pointers.kernel);
-            at(catalogue::INVALID_REQUEST, &Pointers::entry(&list, axis))
+            at(INVALID_REQUEST, &Pointers::entry(&list, axis))
         }
-        E::InvalidRegularization { point: None, .. } => {
-            at(catalogue::INVALID_REQUEST, pointers.regularization)
-        }
+        E::InvalidRegularization { point: None, .. } => at(INVALID_REQUEST, pointers.regularization),
         E::InvalidRegularization { point: Some(point), .. } => {
-            at(catalogue::INVALID_REQUEST, &Pointers::entry(pointers.regularization, point))
+            at(INVALID_REQUEST, &Pointers::entry(pointers.regularization, point))
         }
-        E::InvalidTile { tile, .. } => at(catalogue::INVALID_REQUEST, &Pointers::entry("/tiles", tile)),
+        E::InvalidTile { tile, .. } => at(INVALID_REQUEST, &Pointers::entry("/tiles", tile)),
         E::InvalidRegion { tile, region, .. } => {
-            at(catalogue::INVALID_REQUEST, &format!("/tiles/{tile}/regions/{region}"))
+            at(INVALID_REQUEST, &format!("/tiles/{tile}/regions/{region}"))
         }
-        E::InvalidLink { link } => at(catalogue::INVALID_REQUEST, &Pointers::entry("/links", link)),
-        E::InvalidVariation { entry, .. } => at(catalogue::INVALID_REQUEST, &Pointers::entry("/vary", entry)),
+        E::InvalidLink { link } => at(INVALID_REQUEST, &Pointers::entry("/links", link)),
+        E::InvalidVariation { entry, .. } => at(INVALID_REQUEST, &Pointers::entry("/vary", entry)),
         E::KernelNotPositiveDefinite { .. } => {
             let remedy = format!("{detail}; choose another family");
-            Problem::of_field(
-                catalogue::KERNEL_NOT_POSITIVE_DEFINITE,
-                format!("{}/family", pointers.kernel),
-                remedy,
-            )
+            Problem::of_field(KERNEL_NOT_POSITIVE_DEFINITE, format!("{}/family", pointers.kernel), remedy)
         }
         E::KernelNotSmooth { query, .. } => {
             let remedy = format!(
                 "{detail}; use laplace with epsilon > 0 or matern with nu of 1.5 or more, query elsewhere, or ask for the \
                  geometry of surface offset, which needs no gradient"
             );
-            Problem::of_field(catalogue::KERNEL_NOT_SMOOTH, Pointers::entry(pointers.queries, query), remedy)
+            Problem::of_field(KERNEL_NOT_SMOOTH, Pointers::entry(pointers.queries, query), remedy)
         }
         E::DerivativesVary { .. } => {
             let remedy = format!("{detail}; use matern with nu of 2.5 or more, or another smooth kernel");
-            Problem::of_field(catalogue::KERNEL_NOT_SMOOTH, format!("{}/family", pointers.kernel), remedy)
+            Problem::of_field(KERNEL_NOT_SMOOTH, format!("{}/family", pointers.kernel), remedy)
         }
         E::DuplicatePoints { points } => duplicates(points, &detail, pointers),
         E::NotPositiveDefinite { reason, minimum_alpha } => {
             not_positive_definite(reason, minimum_alpha, &detail, pointers)
         }
-        E::OpenSurface { .. } => at(catalogue::INVALID_REQUEST, "/open"),
-        E::TooManyNodes { .. } => at(catalogue::INVALID_REQUEST, "/step"),
-        E::Unsupported { .. } => at(catalogue::UNSUPPORTED_BY_SOLVER, "/solver"),
+        E::OpenSurface { .. } => at(INVALID_REQUEST, "/open"),
+        E::TooManyNodes { .. } => at(INVALID_REQUEST, "/step"),
+        E::Unsupported { .. } => at(UNSUPPORTED_BY_SOLVER, "/solver"),
         E::RankTooLarge { .. } => {
             let remedy = "take a smoother kernel or a longer length scale, set a larger alpha, or set \"solver\" to \
                           \"iterative\", \"dense\" or \"local\"";
-            at(catalogue::UNSUPPORTED_BY_SOLVER, "/solver").with_remedy(remedy)
+            at(UNSUPPORTED_BY_SOLVER, "/solver").with_remedy(remedy)
         }
         E::NotConverged { .. } => {
             let remedy = "set a larger tolerance or alpha, take a rougher kernel or a shorter length scale, or set \
                           \"solver\" to \"landmark\" or \"dense\"";
-            at(catalogue::NOT_CONVERGED, "/tolerance").with_remedy(remedy)
+            at(NOT_CONVERGED, "/tolerance").with_remedy(remedy)
         }
-        E::Overflow { .. } => Problem::new(
-            catalogue::INVALID_REQUEST,
-            format!("{detail}; scale the values or the length scale"),
-        ),
+        E::Overflow { .. } => {
+            Problem::new(INVALID_REQUEST, format!("{detail}; scale the values or the length scale"))
+        }
         E::OutOfMemory { .. } => {
-            let problem =
-                Problem::new(catalogue::OVERLOADED, format!("{detail}; try again when less is computed"));
+            let problem = Problem::new(OVERLOADED, format!("{detail}; try again when less is computed"));
             problem.retry_after(RETRY_AFTER_MEMORY_SECONDS)
         }
-        E::MeanNotDetermined => at(catalogue::INVALID_REQUEST, "/mean"),
-        E::WeightsOverflow => at(catalogue::INVALID_REQUEST, "/values"),
+        E::MeanNotDetermined => at(INVALID_REQUEST, "/mean"),
+        E::WeightsOverflow => at(INVALID_REQUEST, "/values"),
         // The client that cancelled is gone and reads no answer. The deadline has an answer of its own.
-        E::Cancelled => Problem::new(catalogue::DEADLINE_EXCEEDED, detail),
+        E::Cancelled => Problem::new(DEADLINE_EXCEEDED, detail),
     }
 }
 

@@ -64,8 +64,8 @@ const UNBOUNDED: ListRule = ListRule {
 };
 
 impl Lists {
-    /// The lists of a service: rows with at most `max_width` numbers, refused by `too_wide`, and further kinds
-    /// in the order of their [`List`]s from 2 on.
+    /// The lists of a service: rows with at most `max_width` numbers, refused by `too_wide`, and further
+    /// kinds in the order of their [`List`]s from 2 on.
     pub fn new(
         max_width: usize,
         too_wide: fn(usize, usize, usize) -> Problem,
