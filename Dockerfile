@@ -15,7 +15,7 @@ COPY . .
 # saves compile time.
 RUN --mount=type=cache,id=gramian-registry,target=/usr/local/cargo/registry,sharing=locked \
     --mount=type=cache,id=gramian-target,target=/target,sharing=locked \
-    touch src/lib.rs src/main.rs numerics/src/lib.rs \
+    touch src/lib.rs src/main.rs host/src/lib.rs numerics/src/lib.rs observer/src/lib.rs \
     && CARGO_TARGET_DIR=/target CARGO_PROFILE_RELEASE_DEBUG=false CARGO_PROFILE_RELEASE_STRIP=symbols \
        cargo build --release --locked --all-features --bin gramian \
     && install /target/release/gramian /usr/local/bin/gramian \

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use futures_util::StreamExt;
 use gramian::store::key::CloudId;
-use gramian::store::objects::{Objects, OwnerName};
+use gramian_host::store::{Objects, OwnerName};
 use gramian::store::objects::cloud_object::{decode, encode};
 use gramian_host::store::jobs::JobId;
 use libfuzzer_sys::fuzz_target;

@@ -2,10 +2,10 @@
 
 #![no_main]
 
-use gramian::config::Origins;
+use gramian_host::state::settings::Origins;
 use gramian_host::access::check_file;
 use gramian::store::key::CloudId;
-use gramian::store::objects::Place;
+use gramian_host::store::Place;
 use gramian_host::store::jobs::JobId;
 use libfuzzer_sys::fuzz_target;
 

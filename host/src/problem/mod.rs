@@ -161,9 +161,12 @@ impl Problem {
         self
     }
 
-    /// Adds a member of the service to the document.
-    pub fn with_member(mut self, name: &str, value: impl Into<Value>) -> Self {
-        self.members.further.insert(name.to_owned(), value.into());
+    /// Adds members of the service to the document.
+    pub fn with_members(mut self, members: &impl Serialize) -> Self {
+        // Members that are no object would be a bug, and are left out.
+        if let Ok(Value::Object(members)) = serde_json::to_value(members) {
+            self.members.further.extend(members);
+        }
         self
     }
 

@@ -14,9 +14,11 @@ pub mod version_3_0;
 use serde_json::Value;
 use utoipa::openapi::RefOr;
 use utoipa::openapi::path::{Operation, PathItem};
+use utoipa::openapi::schema::Schema;
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme};
-use utoipa::{Modify, OpenApi};
+use utoipa::{Modify, OpenApi, PartialSchema};
 
+use super::problem::FurtherMembers;
 use gramian_host::problem::ProblemDocument;
 
 /// The parts of the document that no operation declares.
@@ -73,12 +75,29 @@ pub fn set_security(document: &mut utoipa::openapi::OpenApi, takes_key: bool) {
 
 /// Completes the document that the routes declare.
 pub fn complete(document: &mut utoipa::openapi::OpenApi) {
+    add_members_of_problems(document);
     formats::add(document);
     examples::add(document);
     headers::add(document);
     links::add(document);
     empty_answers_to_head(document);
     optional::refuse_null(document);
+}
+
+/// Adds the members that this service has in problem documents, after the fields that were refused.
+fn add_members_of_problems(document: &mut utoipa::openapi::OpenApi) {
+    let problem = document.components.as_mut().and_then(|components| components.schemas.get_mut("Problem"));
+    let (Some(RefOr::T(Schema::Object(problem))), RefOr::T(Schema::Object(further))) =
+        (problem, FurtherMembers::schema())
+    else {
+        return;
+    };
+    let mut further = Some(further.properties);
+    for (name, schema) in std::mem::take(&mut problem.properties) {
+        let is_last = name == "errors";
+        problem.properties.insert(name, schema);
+        problem.properties.extend(further.take_if(|_| is_last).into_iter().flatten());
+    }
 }
 
 /// Removes the bodies of answers to HEAD, which has none, whatever the problem.

@@ -2,13 +2,32 @@
 
 pub mod catalogue;
 
+use serde::Serialize;
+use utoipa::ToSchema;
+
 use gramian_host::problem::slug::Slug;
 pub use gramian_host::problem::{FieldError, Problem};
 use gramian_numerics::error::{NotDefinite, NumericsError};
 
-/// All types of problems that the service answers with.
+/// All types of problems that the service answers with: those of the form of a request, of its subject, and
+/// all others.
 pub fn all() -> Vec<Slug> {
-    [&gramian_host::problem::catalogue::ALL[..], &catalogue::ALL].concat()
+    let general = gramian_host::problem::catalogue::ALL;
+    let n_of_form = general.iter().take_while(|slug| **slug != catalogue::UNKNOWN_JOB).count();
+    let (of_form, others) = general.split_at(n_of_form);
+    [of_form, &catalogue::ALL, others].concat()
+}
+
+/// Members of problem documents that this service adds.
+#[derive(Debug, Default, Serialize, ToSchema)]
+pub struct FurtherMembers {
+    /// An alpha for which the computation succeeds, unit of the values squared.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub minimum_alpha: Option<f64>,
+    /// The points in question, as positions in the cloud. At most the first 1,000.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schema(required = false)]
+    pub point_indices: Vec<usize>,
 }
 
 /// Finds a type of problem by the last segment of its `type`.
@@ -152,14 +171,15 @@ fn not_positive_definite(
     // Rounded up, so that the remedy works when it is typed in.
     let enough = 1.01 * minimum_alpha;
     let remedy = format!("{detail}; set alpha to {enough:.2e} or more, or use a rougher kernel");
-    let mut problem = Problem::of_field(catalogue::NOT_POSITIVE_DEFINITE, pointers.regularization, remedy);
-    if minimum_alpha.is_finite() {
-        problem = problem.with_member("minimum_alpha", minimum_alpha);
-    }
-    match reason {
-        NotDefinite::NeedsCholesky { point } => problem.with_member("point_indices", vec![point]),
-        _ => problem,
-    }
+    let further = FurtherMembers {
+        minimum_alpha: Some(minimum_alpha).filter(|alpha| alpha.is_finite()),
+        point_indices: match reason {
+            NotDefinite::NeedsCholesky { point } => vec![point],
+            _ => Vec::new(),
+        },
+    };
+    Problem::of_field(catalogue::NOT_POSITIVE_DEFINITE, pointers.regularization, remedy)
+        .with_members(&further)
 }
 
 fn duplicates(points: Vec<usize>, detail: &str, pointers: Pointers) -> Problem {
@@ -173,8 +193,8 @@ fn duplicates(points: Vec<usize>, detail: &str, pointers: Pointers) -> Problem {
     });
     // A cloud given by its id has one pointer for all its points.
     let problem = Problem::new(catalogue::DUPLICATE_POINTS, remedy).with_fields(fields);
-    let indices: Vec<usize> = points.into_iter().take(MAX_POINT_INDICES).collect();
-    problem.with_member("point_indices", indices)
+    let point_indices = points.into_iter().take(MAX_POINT_INDICES).collect();
+    problem.with_members(&FurtherMembers { minimum_alpha: None, point_indices })
 }
 
 #[cfg(test)]
