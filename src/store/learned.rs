@@ -23,7 +23,7 @@ pub struct LearnedStore<E> {
 
 impl<E: Clone + Send + Sync + 'static> Default for LearnedStore<E> {
     fn default() -> Self {
-        Self { kept: Arc::new(FairCache::new(MAX_BYTES)), flights: SingleFlight::new() }
+        Self { kept: Arc::new(FairCache::new(MAX_BYTES)), flights: SingleFlight::default() }
     }
 }
 

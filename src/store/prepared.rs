@@ -133,8 +133,8 @@ impl<E: Clone + Send + Sync + 'static> PreparedStore<E> {
         Self {
             fits: Arc::new(FairCache::new(bytes.kept - solutions)),
             solutions: FairCache::new(solutions),
-            flights: SingleFlight::new(),
-            surfaces: SingleFlight::new(),
+            flights: SingleFlight::default(),
+            surfaces: SingleFlight::default(),
             budget,
             spare: SpareBuffer::up_to(bytes.spare),
         }

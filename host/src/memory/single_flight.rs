@@ -26,16 +26,18 @@ pub enum Boarding {
     Joined,
 }
 
+impl<K, V, E> Default for SingleFlight<K, V, E> {
+    fn default() -> Self {
+        Self { flights: Arc::default() }
+    }
+}
+
 impl<K, V, E> SingleFlight<K, V, E>
 where
     K: Hash + Eq + Copy + Send + 'static,
     V: Clone + Send + Sync + 'static,
     E: Clone + Send + Sync + 'static,
 {
-    pub fn new() -> Self {
-        Self { flights: Arc::default() }
-    }
-
     #[expect(clippy::disallowed_methods, reason = "a table, for a look-up: a flight is only awaited outside")]
     fn flights(&self) -> MutexGuard<'_, HashMap<K, WeakFlight<V, E>>> {
         self.flights.lock().unwrap_or_else(PoisonError::into_inner)
@@ -102,7 +104,7 @@ mod tests {
 
     #[tokio::test]
     async fn concurrent_callers_share_one_computation_which_survives_its_beginner() {
-        let (flights, runs) = (Arc::new(Numbers::new()), Arc::new(AtomicUsize::new(0)));
+        let (flights, runs) = (Arc::new(Numbers::default()), Arc::new(AtomicUsize::new(0)));
         let (release, released) = oneshot::channel::<()>();
         let beginner = {
             let (flights, runs) = (flights.clone(), runs.clone());
@@ -130,14 +132,14 @@ mod tests {
 
     #[tokio::test]
     async fn a_failure_is_shared_but_not_kept() {
-        let flights = Numbers::new();
+        let flights = Numbers::default();
         assert_eq!(flights.join(1, || async { Err("no") }).await, (Boarding::Began, Err("no")));
         assert_eq!(flights.join(1, || async { Ok(2) }).await, (Boarding::Began, Ok(2)));
     }
 
     #[tokio::test]
     async fn a_flight_that_has_landed_is_not_under_way_whoever_has_not_looked_yet() {
-        let flights = Numbers::new();
+        let flights = Numbers::default();
         let (release, released) = oneshot::channel::<()>();
         let compute = async move {
             released.await.ok();
@@ -157,7 +159,7 @@ mod tests {
 
     #[tokio::test]
     async fn who_joins_lets_go_of_what_beginning_would_have_taken() {
-        let flights = Numbers::new();
+        let flights = Numbers::default();
         let mut first = Box::pin(flights.join(1, std::future::pending));
         assert!(futures_util::poll!(&mut first).is_pending());
         let (held, is_held) = oneshot::channel::<()>();
@@ -171,7 +173,7 @@ mod tests {
 
     #[tokio::test]
     async fn when_the_last_waiter_leaves_the_computation_is_dropped() {
-        let flights = Numbers::new();
+        let flights = Numbers::default();
         let (sender, receiver) = oneshot::channel::<()>();
         let compute = async move {
             let _held = sender;

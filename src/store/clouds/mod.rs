@@ -35,10 +35,10 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     pub fn new(max_bytes: usize) -> Self {
         Self {
             clouds: FairCache::sparing(max_bytes, |cloud| cloud.is_pending()),
-            samplings: SingleFlight::new(),
-            noise: SingleFlight::new(),
-            landmarks: SingleFlight::new(),
-            reads: SingleFlight::new(),
+            samplings: SingleFlight::default(),
+            noise: SingleFlight::default(),
+            landmarks: SingleFlight::default(),
+            reads: SingleFlight::default(),
             turns: FairSemaphore::default(),
         }
     }

@@ -145,8 +145,7 @@ pub mod testing {
     }
 
     impl Site {
-        /// Checks that all files of the folder are served, but those that people read or run, and the types of
-        /// scripts.
+        /// Checks that all files of the folder are served, but those that people read or run, and types.
         pub fn assert_complete(&self, folder: &str, not_served: &[&str]) {
             let root = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
             let paths = files_in(&root).into_iter();
