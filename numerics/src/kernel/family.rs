@@ -7,7 +7,7 @@ use super::gauss::Gauss;
 use super::inverse_multiquadric::InverseMultiquadric;
 use super::laplace::Laplace;
 use super::matern::Matern;
-use super::profile::{Distances, Profiles};
+use super::profile::{Distances, Profiles, Terms};
 use super::wendland::Wendland;
 pub use super::wendland::WendlandSmoothness;
 use crate::machine::instruction_set::outlined;
@@ -33,6 +33,19 @@ macro_rules! families {
             fn evaluate<S: Simd, const N: usize>(self, distances: Distances<'_, S, N>) {
                 match self {
                     $(Self::$name $({ $parameter })? => $name $({ $parameter })?.evaluate(distances),)*
+                }
+            }
+
+            /// Calls `terms` with φ of each pack of distances, in one loop that keeps it in registers.
+            ///
+            /// It is compiled into its caller. Sums of values lose a fifth of their time where φ goes through
+            /// memory; nothing else loses as much.
+            #[inline(always)]
+            pub(super) fn fold<S: Simd>(self, inverse_square_length: f64, terms: &mut impl Terms<S>) {
+                match self {
+                    $(Self::$name $({ $parameter })? => {
+                        $name $({ $parameter })?.fold(inverse_square_length, terms)
+                    })*
                 }
             }
         }

@@ -10,7 +10,7 @@ use pulp::Simd;
 
 use super::facts::{Facts, SMOOTH_SPACINGS};
 use super::laplace::Laplace;
-use super::profile::{Distances, Profile, Profiles, distance_and_inverse};
+use super::profile::{Distances, Profile, Profiles, Terms, distance_and_inverse};
 use crate::machine::registers::Pack;
 use crate::machine::registers::exp::exp_minus;
 use crate::points::sampling::Scales;
@@ -34,6 +34,16 @@ impl Profiles for Matern {
             1 => OfOrder::<1>.evaluate(distances),
             2 => OfOrder::<2>.evaluate(distances),
             order => OfAnyOrder { order }.evaluate(distances),
+        }
+    }
+
+    #[inline(always)]
+    fn fold<S: Simd>(self, inverse_square_length: f64, terms: &mut impl Terms<S>) {
+        match self.order {
+            0 => Laplace { epsilon: 0.0 }.fold(inverse_square_length, terms),
+            1 => OfOrder::<1>.fold(inverse_square_length, terms),
+            2 => OfOrder::<2>.fold(inverse_square_length, terms),
+            order => OfAnyOrder { order }.fold(inverse_square_length, terms),
         }
     }
 }

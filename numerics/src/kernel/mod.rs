@@ -31,7 +31,7 @@ use super::points::cloud::Cloud;
 use axes::Axes;
 pub use family::Family;
 pub use matern::MAX_MATERN_ORDER;
-pub(crate) use profile::{Distances, HUGE, distance_and_inverse};
+pub(crate) use profile::{Distances, HUGE, Terms, distance_and_inverse};
 pub use wendland::WendlandSmoothness;
 
 /// Upper bound of `2|φ′|√q = ℓ|∇k|/variance` in any family. Wendland's of smoothness 6 reaches 2.8.
@@ -205,6 +205,12 @@ impl Kernel {
     /// Returns φ, φ′ and φ″ at 0, for families that have them there.
     pub(crate) fn profile_at_zero(&self) -> [f64; 3] {
         self.family.profile_at_zero()
+    }
+
+    /// Calls `terms` with φ of each pack of distances, in one loop that keeps it in registers.
+    #[inline(always)]
+    pub(crate) fn fold<S: Simd>(&self, terms: &mut impl Terms<S>) {
+        self.family.fold(self.inverse_square_length, terms);
     }
 
     /// Overwrites squared distances, the first of these lists, by φ, and the others by φ′ and φ″.

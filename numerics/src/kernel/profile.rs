@@ -32,6 +32,21 @@ pub(super) trait Profile {
 pub(super) trait Profiles {
     /// Overwrites squared distances by φ, and the other lists by φ′ and φ″, as [`Distances`] describes.
     fn evaluate<S: Simd, const N: usize>(self, distances: Distances<'_, S, N>);
+
+    /// Calls `terms` with φ of each pack of distances, in one loop that keeps it in registers.
+    fn fold<S: Simd>(self, inverse_square_length: f64, terms: &mut impl Terms<S>);
+}
+
+/// A sum over packs of pairs whose terms need φ alone.
+pub(crate) trait Terms<S: Simd> {
+    /// Number of packs.
+    fn n_packs(&self) -> usize;
+
+    /// Squared distances of a pack of pairs, unit L².
+    fn squared_distances(&self, at: usize) -> Pack<S>;
+
+    /// Adds the terms of a pack.
+    fn add(&mut self, at: usize, phi: Pack<S>);
 }
 
 impl<P: Profile> Profiles for P {
@@ -43,6 +58,14 @@ impl<P: Profile> Profiles for P {
             for order in 0..N {
                 profile[order].write(lists[order], at);
             }
+        }
+    }
+
+    #[inline(always)]
+    fn fold<S: Simd>(self, inverse_square_length: f64, terms: &mut impl Terms<S>) {
+        for at in 0..terms.n_packs() {
+            let [phi, ..] = self.at(terms.squared_distances(at) * inverse_square_length);
+            terms.add(at, phi);
         }
     }
 }

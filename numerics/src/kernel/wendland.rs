@@ -6,7 +6,7 @@
 use pulp::Simd;
 
 use super::facts::{Facts, SMOOTH_SPACINGS};
-use super::profile::{Distances, Profile, Profiles, distance_and_inverse};
+use super::profile::{Distances, Profile, Profiles, Terms, distance_and_inverse};
 use crate::machine::registers::Pack;
 use crate::points::sampling::Scales;
 
@@ -32,6 +32,15 @@ impl Profiles for Wendland {
             WendlandSmoothness::C2 => C2.evaluate(distances),
             WendlandSmoothness::C4 => C4.evaluate(distances),
             WendlandSmoothness::C6 => C6.evaluate(distances),
+        }
+    }
+
+    #[inline(always)]
+    fn fold<S: Simd>(self, inverse_square_length: f64, terms: &mut impl Terms<S>) {
+        match self.smoothness {
+            WendlandSmoothness::C2 => C2.fold(inverse_square_length, terms),
+            WendlandSmoothness::C4 => C4.fold(inverse_square_length, terms),
+            WendlandSmoothness::C6 => C6.fold(inverse_square_length, terms),
         }
     }
 }

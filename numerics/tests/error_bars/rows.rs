@@ -1,6 +1,8 @@
 //! A coarse selection of the rows of docs/error-bars.md. Every shape, sampling and
 //! noise occurs several times.
 
+use std::sync::LazyLock;
+
 use rayon::prelude::*;
 
 use crate::sampling::SAMPLINGS;
@@ -28,18 +30,20 @@ fn selection() -> Vec<Case> {
     cases
 }
 
+/// All cases with their rows, for every test here.
+static ROWS: LazyLock<Vec<(Case, Row)>> =
+    LazyLock::new(|| selection().into_par_iter().map(|case| (case, case.run(1))).collect());
+
 #[test]
 fn true_values_lie_within_the_error_bars() {
-    let cases = selection();
-    let rows: Vec<Row> = cases.par_iter().map(|case| case.run(1)).collect();
-    for (case, row) in cases.iter().zip(&rows) {
+    for (case, row) in &*ROWS {
         let least = if case.noise > 0.0 { 90.0 } else { 85.0 };
         let coverages = row.coverages();
         assert!(coverages.iter().all(|&c| c >= least - MARGIN), "{case:?}: {coverages:.1?}");
     }
     // Bars that are too long cover everything. Over all noisy rows the mean coverage must
     // be near the nominal 95 %.
-    let noisy = || cases.iter().zip(&rows).filter(|(case, _)| case.noise > 0.0).map(|(_, row)| row);
+    let noisy = || ROWS.iter().filter(|(case, _)| case.noise > 0.0).map(|(_, row)| row);
     for quantity in 0..4 {
         let n_rows = noisy().count() as f64;
         let mean = noisy().map(|row| row.coverages()[quantity]).sum::<f64>() / n_rows;
@@ -49,10 +53,8 @@ fn true_values_lie_within_the_error_bars() {
 
 #[test]
 fn of_curvatures_without_a_flag_one_in_a_hundred_is_off_by_half_at_most() {
-    let cases = selection();
-    let rows: Vec<(f64, Row)> = cases.par_iter().map(|case| (case.noise, case.run(1))).collect();
     for noise in NOISES {
-        let of_noise = || rows.iter().filter(|(of_row, _)| *of_row == noise).map(|(_, row)| row);
+        let of_noise = || ROWS.iter().filter(|(case, _)| case.noise == noise).map(|(_, row)| row);
         let n_off: usize = of_noise().map(|row| row.n_off).sum();
         let n_unflagged: usize = of_noise().map(Row::n_unflagged).sum();
         // The count may exceed one in a hundred by three of its standard errors.

@@ -183,6 +183,18 @@ impl<S: Simd, const N: usize> Pack<S, N> {
         self
     }
 
+    /// Returns `sum` plus the products with `other`, added register by register.
+    ///
+    /// These N additions wait for each other, but their chain is shorter than the other work on a pack.
+    #[inline(always)]
+    pub(crate) fn add_products_to(self, other: Self, mut sum: Pack<S, 1>) -> Pack<S, 1> {
+        for i in 0..N {
+            let (a, b) = ([self.registers[i]], [other.registers[i]]);
+            sum = Pack { simd: self.simd, registers: a }.mul_add(Pack { simd: self.simd, registers: b }, sum);
+        }
+        sum
+    }
+
     #[inline(always)]
     fn map(mut self, f: impl Fn(S, S::f64s) -> S::f64s) -> Self {
         for register in &mut self.registers {

@@ -52,6 +52,35 @@ impl Nodes {
         self.instruction_set.dispatch(op)
     }
 
+    /// Returns `|u|²` for the pairs of a query with pack `at` of a block, unit L², with u as in
+    /// [`Nodes::squared_distances`].
+    #[inline(always)]
+    pub(crate) fn squared_distances_of_pack<S: Simd>(
+        &self,
+        simd: S,
+        pairs: BlockPairs<'_>,
+        at: usize,
+    ) -> Pack<S> {
+        let columns = &self.coordinates[pairs.block * self.dimension..][..self.dimension];
+        let coordinates = columns.iter().zip(pairs.x);
+        let mut sum = Pack::<S>::splat(simd, 0.0);
+        match pairs.kernel.factors() {
+            None => {
+                for (column, &x) in coordinates {
+                    let difference = x - Pack::load(simd, column, at);
+                    sum = difference.mul_add(difference, sum);
+                }
+            }
+            Some(factors) => {
+                for ((column, &x), &factor) in coordinates.zip(factors) {
+                    let difference = (x - Pack::load(simd, column, at)) * factor;
+                    sum = difference.mul_add(difference, sum);
+                }
+            }
+        }
+        sum
+    }
+
     /// Writes `|u|²` for the pairs of a query with a block, unit L².
     ///
     /// Here u is the difference `x − y` of query and point, stretched as the kernel stretches it.

@@ -7,12 +7,38 @@
 use pulp::Simd;
 
 use super::totals::{Expansion, ProfileBlock, Sum, Sums};
-use crate::kernel::{HUGE, Kernel, distance_and_inverse};
-use crate::machine::registers::Block;
-use crate::regression::sums::nodes::BlockPairs;
+use crate::kernel::{HUGE, Kernel, Terms, distance_and_inverse};
+use crate::machine::registers::{Block, Pack};
+use crate::regression::sums::nodes::{BlockPairs, Nodes};
 
 /// Coordinates per tile.
 const TILE: usize = 3;
+
+/// `Σλφ` of a query and the points of a block, added to `value`.
+struct Values<'a, S: Simd> {
+    simd: S,
+    nodes: &'a Nodes,
+    pairs: BlockPairs<'a>,
+    weights: &'a Block,
+    value: Sum<S>,
+}
+
+impl<S: Simd> Terms<S> for Values<'_, S> {
+    #[inline(always)]
+    fn n_packs(&self) -> usize {
+        Pack::<S>::PER_BLOCK
+    }
+
+    #[inline(always)]
+    fn squared_distances(&self, at: usize) -> Pack<S> {
+        self.nodes.squared_distances_of_pack(self.simd, self.pairs, at)
+    }
+
+    #[inline(always)]
+    fn add(&mut self, at: usize, phi: Pack<S>) {
+        self.value = Pack::load(self.simd, self.weights, at).add_products_to(phi, self.value);
+    }
+}
 
 impl<S: Simd> Sums<S> {
     /// Adds the contributions of the points of a block to the sums at x.
@@ -25,6 +51,13 @@ impl<S: Simd> Sums<S> {
         x: &[f64],
     ) {
         let Expansion { nodes, kernel, weights } = expansion;
+        if ORDER == 0 {
+            let (pairs, weights) = (BlockPairs { kernel, x, block }, &weights[block]);
+            let mut values = Values { simd, nodes, pairs, weights, value: self.value };
+            kernel.fold(&mut values);
+            self.value = values.value;
+            return;
+        }
         self.block.fill::<S, ORDER>(simd, nodes, BlockPairs { kernel, x, block });
         self.add_block::<ORDER>(simd, &weights[block]);
     }
@@ -32,9 +65,6 @@ impl<S: Simd> Sums<S> {
     /// Adds the contributions of a block, whose differences and profiles are at hand.
     #[inline(always)]
     pub(super) fn add_block<const ORDER: usize>(&mut self, simd: S, weights: &Block) {
-        if ORDER == 0 {
-            return self.add_values(simd, weights);
-        }
         let d = self.gradient.len();
         for a in (0..d).step_by(TILE) {
             match d - a {
@@ -53,17 +83,6 @@ impl<S: Simd> Sums<S> {
                 }
             }
         }
-    }
-
-    /// Adds `Σλφ` alone.
-    #[inline(always)]
-    fn add_values(&mut self, simd: S, weights: &Block) {
-        let mut value = self.value;
-        for at in 0..Sum::<S>::PER_BLOCK {
-            let phi = Sum::load(simd, &self.block.profiles[0], at);
-            value = Sum::load(simd, weights, at).mul_add(phi, value);
-        }
-        self.value = value;
     }
 
     /// Adds to the entries `a..a + N` of the gradient, and to those of the Hessian between these coordinates.

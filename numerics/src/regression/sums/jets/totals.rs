@@ -38,11 +38,9 @@ impl ProfileBlock {
         pairs: BlockPairs<'_>,
     ) {
         let Self { profiles: [phi, slope, bend], differences } = self;
-        let differences = if ORDER == 0 { &mut [] } else { &mut differences[..] };
         nodes.squared_distances(simd, pairs, phi, differences);
         let (phi, kernel) = (phi.registers_mut::<S>(), pairs.kernel);
         match ORDER {
-            0 => kernel.profiles(simd, [phi]),
             1 => kernel.profiles(simd, [phi, slope.registers_mut::<S>()]),
             _ => kernel.profiles(simd, [phi, slope.registers_mut::<S>(), bend.registers_mut::<S>()]),
         }
