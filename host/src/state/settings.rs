@@ -137,17 +137,17 @@ impl Settings {
         Duration::from_secs_f64(self.deadline_seconds)
     }
 
-    /// [`Config::idle_seconds`] as a duration.
+    /// [`Settings::idle_seconds`] as a duration.
     pub fn idle(&self) -> Duration {
         Duration::from_secs_f64(self.idle_seconds)
     }
 
-    /// [`Config::send_seconds`] as a duration.
+    /// [`Settings::send_seconds`] as a duration.
     pub fn sending(&self) -> Duration {
         Duration::from_secs_f64(self.send_seconds)
     }
 
-    /// [`Config::drain_seconds`] as a duration.
+    /// [`Settings::drain_seconds`] as a duration.
     pub fn drain(&self) -> Duration {
         Duration::from_secs_f64(self.drain_seconds)
     }

@@ -15,7 +15,7 @@ pub struct ParseContext<'a> {
     pub observer: &'a dyn Observer,
 }
 
-/// A kind of list: its position in [`Lists::rules`], after the two kinds that every service has.
+/// A kind of list: its position among those of [`Lists`], after the two kinds that every service has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct List(pub u8);
 
