@@ -1,7 +1,7 @@
 //! Serves computations that take minutes, in bounded memory, over HTTP.
 //!
-//! This crate knows no subject. A service over it defines its requests, what they cost and how they are
-//! computed (`operation`), and has a place for everything else: bodies within limits, memory reserved before
+//! The crate is independent of any subject. A service over it defines requests, their prices and their
+//! computation (`operation`). The host provides everything else: bodies within limits, memory reserved before
 //! it is used, threads by size of work and in turns among owners, jobs that outlive their connection, problem
 //! documents, keys, sockets.
 

@@ -90,7 +90,7 @@ pub async fn name_and_log(State(host): State<Arc<Host>>, mut request: Request, n
     response
 }
 
-/// What the request is about, as it names it in its header or path, for proxies. Its answer repeats the id.
+/// Id of the subject of a request, from its header or its path. The answer repeats the id for proxies.
 fn named_subject(host: &Host, request: &Request) -> Option<(HeaderName, HeaderValue)> {
     let Subject { header, path, is_id } = host.guest.subject.as_ref()?;
     let is_id = |text: &&str| is_id(text);

@@ -16,7 +16,7 @@ pub struct AnswerHeaders {
     /// Encoding time, absent if encoding continues while the answer is sent.
     encode: Option<Duration>,
     cache: Option<CacheOutcome>,
-    /// What the answer is about, in the header of the service for it.
+    /// Id of the subject of the answer, in the header that the service defines.
     subject: Option<(HeaderName, HeaderValue)>,
 }
 

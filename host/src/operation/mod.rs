@@ -44,7 +44,7 @@ pub trait Step: Send {
     fn advance<'a>(self: Box<Self>, call: &'a Call) -> BoxFuture<'a, Result<Next, Problem>>;
 }
 
-/// What comes next for a request.
+/// The next state of a request: another step, or its answer.
 pub enum Next {
     Step(Box<dyn Step>),
     Answer(Box<Answer>),

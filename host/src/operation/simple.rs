@@ -13,7 +13,7 @@ use crate::wire::negotiation::Format;
 use crate::wire::write::answer::Answer as Members;
 use gramian_observer::Price;
 
-/// A computation over HTTP: a request that knows its price, and the answer to it.
+/// A computation over HTTP: a request with its price, and the answer to it.
 pub trait Operation: DeserializeOwned + Send + 'static {
     /// Operation id in the OpenAPI document.
     const NAME: &'static str;

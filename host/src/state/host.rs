@@ -1,4 +1,4 @@
-//! The host: what all requests share, whatever they compute.
+//! The host: shared state of all requests, independent of what they compute.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
@@ -43,7 +43,7 @@ pub struct Shares {
     pub work: usize,
 }
 
-/// What a service brings to its host.
+/// The parts of a host that depend on the service over it.
 pub struct Guest {
     pub shares: Shares,
     /// Limits of the lists of its requests.

@@ -1,4 +1,4 @@
-//! What all requests share, whatever they compute. This module knows no request.
+//! Shared state of all requests, independent of what they compute.
 
 pub mod host;
 pub mod jobs;

@@ -1,4 +1,4 @@
-//! What clients are told about the store, and changes of it that end even if their client leaves.
+//! Refusals for a store that does not answer, and changes that end even if their client leaves.
 
 use std::future::Future;
 
