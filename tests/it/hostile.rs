@@ -116,7 +116,7 @@ async fn ask_all(
 
 #[tokio::test]
 async fn the_deadline_ends_the_work_on_every_route_whatever_the_cloud() {
-    let flags = ["--deadline-seconds", "2", "--threads", "2", "--max-queue", "64"];
+    let flags = ["--deadline-seconds", "1", "--threads", "2", "--max-queue", "64"];
     let process = Process::start(&flags);
     let client = http_client().build().unwrap();
     // Too large to be factorized, and well within that limit.

@@ -34,7 +34,7 @@ use crate::state::host::Host;
 pub use answer::Answer;
 pub use call::{Call, Outlook};
 pub use headers::AnswerHeaders;
-pub use ready::{Ready, Work};
+pub use ready::{Computation, Ready};
 pub use received::{AnyRequest, Parse, REQUEST_FORMATS, Received};
 pub use simple::{Operation, operation};
 

@@ -3,18 +3,18 @@
 use std::time::Instant;
 
 use super::{Answer, AnswerHeaders, Call};
-use crate::compute::{JobObserver, Work as KnownWork};
+use crate::compute::{JobObserver, Work};
 use crate::memory::budget::Reservation;
 use crate::problem::Problem;
 use crate::wire::write::answer::Answer as Members;
 use crate::wire::write::encode::Encoded;
 
 /// Computes an answer, on the pool.
-pub type Work = Box<dyn FnOnce(&JobObserver) -> Result<Box<dyn Members>, Problem> + Send>;
+pub type Computation = Box<dyn FnOnce(&JobObserver) -> Result<Box<dyn Members>, Problem> + Send>;
 
 /// A request for which everything is at hand.
 pub struct Ready {
-    pub work: Work,
+    pub work: Computation,
     /// Flops of the work.
     pub flops: f64,
     /// Memory of the request until its answer is computed.
@@ -43,7 +43,7 @@ impl Ready {
         let answer = self.answered(call, observer)?;
         let after = observer.times();
         if !after.ended_early {
-            let work = KnownWork { operation: call.operation, is_cached: true, flops };
+            let work = Work { operation: call.operation, is_cached: true, flops };
             call.admission.did_at_once(work, after.whole - before.whole);
         }
         Ok(answer)

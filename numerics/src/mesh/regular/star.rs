@@ -105,7 +105,6 @@ impl Triangulation {
         for (vertex, star) in self.stars.iter().enumerate().filter(|(_, star)| !star.is_empty()) {
             place[vertex] = (vertices.len() / 3) as u32;
             vertices.extend(self.positions[vertex]);
-            debug_assert!(!star.is_empty());
         }
         let left = self.triangles.iter().filter(|triangle| **triangle != REMOVED);
         let cells = left.flat_map(|triangle| triangle.map(|vertex| place[vertex as usize])).collect();

@@ -155,7 +155,6 @@ impl Jets {
         order: JetOrder,
         observer: &dyn Observer,
     ) -> Result<Self> {
-        debug_assert_eq!(nodes.dimension(), queries.dimension());
         let layout = Layout { order, dimension: nodes.dimension() };
         let (weights, width) = (blocked(weights), layout.width());
         let expansion = Expansion { nodes, kernel, weights: &weights };
