@@ -102,7 +102,7 @@ impl Triangulation {
     pub fn into_mesh(self) -> Mesh {
         let mut place = vec![u32::MAX; self.positions.len()];
         let mut vertices = Vec::new();
-        for (vertex, star) in self.stars.iter().enumerate().filter(|(_, star)| !star.is_empty()) {
+        for (vertex, _) in self.stars.iter().enumerate().filter(|(_, star)| !star.is_empty()) {
             place[vertex] = (vertices.len() / 3) as u32;
             vertices.extend(self.positions[vertex]);
         }

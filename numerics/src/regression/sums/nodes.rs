@@ -52,28 +52,34 @@ impl Nodes {
         self.instruction_set.dispatch(op)
     }
 
-    /// Returns `|u|²` for the pairs of a query with pack `at` of a block, unit L², with u as in
-    /// [`Nodes::squared_distances`].
+    /// Returns `|u|²` for the pairs of a query with pack `at` of a block, unit L².
+    ///
+    /// Here u is the difference `x − y` of query and point, stretched as the kernel stretches it. `take` is
+    /// called with each coordinate and the entries of u along it.
     #[inline(always)]
     pub(crate) fn squared_distances_of_pack<S: Simd>(
         &self,
         simd: S,
-        pairs: BlockPairs<'_>,
+        BlockPairs { kernel, x, block }: BlockPairs<'_>,
         at: usize,
+        mut take: impl FnMut(usize, Pack<S>),
     ) -> Pack<S> {
-        let columns = &self.coordinates[pairs.block * self.dimension..][..self.dimension];
-        let coordinates = columns.iter().zip(pairs.x);
+        let columns = &self.coordinates[block * self.dimension..][..self.dimension];
+        let coordinates = columns.iter().zip(x).enumerate();
         let mut sum = Pack::<S>::splat(simd, 0.0);
-        match pairs.kernel.factors() {
+        // Two loops, because a test for each coordinate would take a twentieth of their time.
+        match kernel.factors() {
             None => {
-                for (column, &x) in coordinates {
+                for (c, (column, &x)) in coordinates {
                     let difference = x - Pack::load(simd, column, at);
+                    take(c, difference);
                     sum = difference.mul_add(difference, sum);
                 }
             }
             Some(factors) => {
-                for ((column, &x), &factor) in coordinates.zip(factors) {
+                for ((c, (column, &x)), &factor) in coordinates.zip(factors) {
                     let difference = (x - Pack::load(simd, column, at)) * factor;
+                    take(c, difference);
                     sum = difference.mul_add(difference, sum);
                 }
             }
@@ -81,10 +87,9 @@ impl Nodes {
         sum
     }
 
-    /// Writes `|u|²` for the pairs of a query with a block, unit L².
-    ///
-    /// Here u is the difference `x − y` of query and point, stretched as the kernel stretches it.
-    /// `differences` takes the entries of u, one block each, or is empty.
+    /// Writes `|u|²` for the pairs of a query with a block, unit L², with u as in
+    /// [`Nodes::squared_distances_of_pack`]. `differences` takes the entries of u, one block each, or is
+    /// empty.
     #[inline(always)]
     pub(crate) fn squared_distances<S: Simd>(
         &self,
@@ -93,36 +98,13 @@ impl Nodes {
         squares: &mut Block,
         differences: &mut [Block],
     ) {
-        let columns = &self.coordinates[pairs.block * self.dimension..][..self.dimension];
-        let coordinates = columns.iter().zip(pairs.x).enumerate();
-        // Two loops, because a test for each coordinate would take a twentieth of their time.
-        match pairs.kernel.factors() {
-            None => {
-                for at in 0..Pack::<S>::PER_BLOCK {
-                    let mut sum = Pack::<S>::splat(simd, 0.0);
-                    for (c, (column, &x)) in coordinates.clone() {
-                        let difference = x - Pack::load(simd, column, at);
-                        if !differences.is_empty() {
-                            difference.store(&mut differences[c], at);
-                        }
-                        sum = difference.mul_add(difference, sum);
-                    }
-                    sum.store(squares, at);
+        for at in 0..Pack::<S>::PER_BLOCK {
+            let sum = self.squared_distances_of_pack(simd, pairs, at, |c, difference| {
+                if !differences.is_empty() {
+                    difference.store(&mut differences[c], at);
                 }
-            }
-            Some(factors) => {
-                for at in 0..Pack::<S>::PER_BLOCK {
-                    let mut sum = Pack::<S>::splat(simd, 0.0);
-                    for ((c, (column, &x)), &factor) in coordinates.clone().zip(factors) {
-                        let difference = (x - Pack::load(simd, column, at)) * factor;
-                        if !differences.is_empty() {
-                            difference.store(&mut differences[c], at);
-                        }
-                        sum = difference.mul_add(difference, sum);
-                    }
-                    sum.store(squares, at);
-                }
-            }
+            });
+            sum.store(squares, at);
         }
     }
 }

@@ -31,7 +31,7 @@ impl<S: Simd> Terms<S> for Values<'_, S> {
 
     #[inline(always)]
     fn squared_distances(&self, at: usize) -> Pack<S> {
-        self.nodes.squared_distances_of_pack(self.simd, self.pairs, at)
+        self.nodes.squared_distances_of_pack(self.simd, self.pairs, at, |_, _| {})
     }
 
     #[inline(always)]
