@@ -120,7 +120,10 @@ def test_a_forked_child_has_a_service_of_its_own_and_leaves_that_of_its_parent()
 
 
 def test_ctrl_c_ends_no_service() -> None:
+    # What runs in the background of a script ignores interrupts, and so do its children.
     code = """
+        import signal
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         cloud = gramian.cloud(points)
         try:
             print(*services(), flush=True)
