@@ -1,6 +1,6 @@
 //! Entries of a list: counted to the end, but kept only up to the limit.
 
-use serde::de::{DeserializeSeed, Error as _, SeqAccess};
+use serde::de::{Deserialize, DeserializeSeed, Error as _, IntoDeserializer, SeqAccess};
 use serde_json::Error;
 
 use super::Value;
@@ -11,6 +11,9 @@ use crate::wire::read::limits::{Excess, List};
 
 /// Entries that a list is granted at a time. Within a grant, counting an entry is a single decrement.
 const ENTRIES_PER_GRANT: usize = 64;
+
+/// Refusal of entries that a type of a fixed length does not read.
+pub(super) const LONGER_THAN_EXPECTED: &str = "the list is longer than expected";
 
 /// The entries of a list, all counted, of which at most `max_length` are kept.
 pub(super) struct Entries<'r, 'a> {
@@ -61,7 +64,37 @@ impl<'r, 'a> Entries<'r, 'a> {
     /// Checks that no entry is left, since types of a fixed length read no more than that.
     pub(super) fn end(&mut self) -> Result<(), Error> {
         let has_more = !self.is_over && self.goes_on()?;
-        if has_more { Err(Error::custom("the list is longer than expected")) } else { Ok(()) }
+        if has_more { Err(Error::custom(LONGER_THAN_EXPECTED)) } else { Ok(()) }
+    }
+
+    /// Reads all entries, which are numbers. Replaces what is in `numbers`.
+    #[inline(never)]
+    pub(super) fn read_numbers(mut self, numbers: &mut Vec<f64>) -> Result<(), Error> {
+        numbers.clear();
+        loop {
+            if self.n_left == 0 && !self.is_granted_more()? {
+                return self.count(None);
+            }
+            let number = match self.goes_on() {
+                Ok(true) => self.number(),
+                Ok(false) => return Ok(()),
+                Err(error) => Err(error),
+            };
+            match number {
+                Ok(number) => numbers.push(number),
+                Err(error) => return Err(self.reader.passed(self.length(), error)),
+            }
+            self.n_left -= 1;
+        }
+    }
+
+    /// Reads the next entry, which is a number.
+    #[inline(always)]
+    fn number(&mut self) -> Result<f64, Error> {
+        match self.source_of_entry {
+            Source::Text if self.reader.text.is_number() => self.reader.text.number(),
+            _ => f64::deserialize(self.value()),
+        }
     }
 
     /// Number of entries read so far.
@@ -189,5 +222,23 @@ impl<'a> SeqAccess<'a> for Entries<'_, 'a> {
             None => None,
         };
         expected.map(|length| length.min(self.max_length))
+    }
+}
+
+/// The numbers of a row that were not shown yet.
+pub(super) struct Numbers<'n>(pub(super) &'n [f64]);
+
+impl<'de> SeqAccess<'de> for Numbers<'_> {
+    type Error = Error;
+
+    #[inline(always)]
+    fn next_element_seed<S: DeserializeSeed<'de>>(&mut self, seed: S) -> Result<Option<S::Value>, Error> {
+        let Some((number, rest)) = self.0.split_first() else { return Ok(None) };
+        self.0 = rest;
+        seed.deserialize(number.into_deserializer()).map(Some)
+    }
+
+    fn size_hint(&self) -> Option<usize> {
+        Some(self.0.len())
     }
 }

@@ -36,7 +36,7 @@ use serde::forward_to_deserialize_any;
 use serde_json::Error;
 
 use super::limits::List;
-use entries::Entries;
+use entries::{Entries, LONGER_THAN_EXPECTED, Numbers};
 use object::{GIVEN_TWICE, Members};
 use source::{Source, Tables};
 pub use state::{Reader, Stop};
@@ -127,9 +127,28 @@ impl<'r, 'a> Value<'r, 'a> {
     /// Shows the list whose beginning was read to a visitor.
     #[inline(always)]
     fn visit_list<V: Visitor<'a>>(self, visitor: V) -> Result<V::Value, Error> {
+        if self.list == List::ROW {
+            return self.visit_row(visitor);
+        }
         let mut entries = Entries::new(self);
         let list = visitor.visit_seq(&mut entries)?;
         entries.end().map(|()| list)
+    }
+
+    /// Shows a row to a visitor. Its numbers are read first, all at once, by code that does not depend on the
+    /// visitor and so is compiled here, not with the types of the service.
+    #[inline(always)]
+    fn visit_row<V: Visitor<'a>>(self, visitor: V) -> Result<V::Value, Error> {
+        let Value { reader, source, list, depth } = self;
+        let mut numbers = std::mem::take(&mut reader.row);
+        Entries::new(Value { reader: &mut *reader, source, list, depth }).read_numbers(&mut numbers)?;
+        let mut row = Numbers(&numbers);
+        let shown = visitor.visit_seq(&mut row)?;
+        if !row.0.is_empty() {
+            return Err(Error::custom(LONGER_THAN_EXPECTED));
+        }
+        reader.row = numbers;
+        Ok(shown)
     }
 }
 

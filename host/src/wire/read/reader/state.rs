@@ -41,6 +41,8 @@ pub struct Reader<'a> {
     pub(super) are_numbers_in_tables: bool,
     pub(super) operation: Operation,
     grants_until_check: u32,
+    /// Room for the numbers of a row.
+    pub(super) row: Vec<f64>,
     /// Length of the row that was just read, if it has too many entries.
     pub(super) too_wide: Option<usize>,
     stop: Option<Stop>,
@@ -60,6 +62,7 @@ impl<'a> Reader<'a> {
             are_numbers_in_tables: false,
             operation: Operation::Shown,
             grants_until_check: 0,
+            row: Vec::new(),
             too_wide: None,
             stop: None,
             path: Vec::new(),

@@ -183,7 +183,7 @@ impl<'a> Text<'a> {
     ///
     /// There is no leading plus or zero, digits stand on both sides of the point, and `inf` and `nan` are
     /// refused.
-    #[inline(never)]
+    #[inline(always)]
     pub(super) fn number(&mut self) -> Result<f64, Error> {
         let text = self.rest;
         let Ok((x, length)) = fast_float2::parse_partial::<f64, _>(text) else {
