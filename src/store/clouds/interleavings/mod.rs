@@ -212,34 +212,44 @@ async fn exhaust(setting: Setting, requests: &[(Request, usize)]) -> usize {
 
 const DIRECTORY: Setting = Setting { n_processes: 1, tells_absence: true, n_bytes: 1 << 20 };
 
-/// Runs every pair of requests, the second of them by the last process. Returns the number of interleavings.
-async fn exhaust_pairs(n_processes: usize) -> usize {
+const TWO_PROCESSES: Setting = Setting { n_processes: 2, ..DIRECTORY };
+
+/// Runs every pair of requests, the second of them by the last process.
+async fn exhaust_pairs(setting: Setting) {
     use Request::{Delete, Get, List, Post};
     let mut n_ways = 0;
-    for n_bytes in [0, 1 << 20] {
-        let setting = Setting { n_processes, n_bytes, ..DIRECTORY };
-        for pair in
-            [[Post, Post], [Post, Delete], [Delete, Delete], [Get, Delete], [List, Delete], [List, Post]]
-        {
-            n_ways += exhaust(setting, &[(pair[0], 0), (pair[1], n_processes - 1)]).await;
-        }
+    for pair in [[Post, Post], [Post, Delete], [Delete, Delete], [Get, Delete], [List, Delete], [List, Post]]
+    {
+        n_ways += exhaust(setting, &[(pair[0], 0), (pair[1], setting.n_processes - 1)]).await;
     }
     println!("{n_ways} interleavings");
-    n_ways
+    assert!(n_ways > 100, "{n_ways}");
 }
 
 #[tokio::test]
-async fn every_interleaving_of_two_requests_of_a_process_leaves_one_truth() {
-    let n_ways = exhaust_pairs(1).await;
-    assert!(n_ways > 100, "{n_ways}");
+async fn every_interleaving_of_two_requests_leaves_one_truth() {
+    exhaust_pairs(DIRECTORY).await;
+}
+
+#[tokio::test]
+async fn every_interleaving_of_two_requests_leaves_one_truth_where_memory_keeps_nothing() {
+    exhaust_pairs(Setting { n_bytes: 0, ..DIRECTORY }).await;
 }
 
 #[tokio::test]
 async fn every_interleaving_of_requests_of_two_processes_leaves_one_truth() {
-    let n_ways = exhaust_pairs(2).await;
-    assert!(n_ways > 100, "{n_ways}");
-    let two_processes = Setting { n_processes: 2, ..DIRECTORY };
-    assert!(exhaust(two_processes, &[(Request::Sweep, 0), (Request::Post, 1)]).await > 1);
+    exhaust_pairs(TWO_PROCESSES).await;
+}
+
+#[tokio::test]
+async fn every_interleaving_of_requests_of_two_processes_leaves_one_truth_where_memory_keeps_nothing() {
+    exhaust_pairs(Setting { n_bytes: 0, ..TWO_PROCESSES }).await;
+}
+
+#[tokio::test]
+async fn a_sweep_and_a_post_of_another_process_leave_one_truth() {
+    let n_ways = exhaust(TWO_PROCESSES, &[(Request::Sweep, 0), (Request::Post, 1)]).await;
+    assert!(n_ways > 1, "{n_ways}");
 }
 
 /// Runs random requests of `n_processes` processes at random moments. With `may_fail`, the store refuses
