@@ -5,9 +5,9 @@
 //! dependent chains, such as the polynomial of the exponential.
 //!
 //! Every function between [`super::instruction_set::InstructionSet::dispatch`] and here is
-//! `#[inline(always)]`. Loop bodies and profiles are methods of traits, not closures or functions passed as
-//! values. Otherwise they would not be compiled into the dispatched function itself. Code outside it falls
-//! back to one call per instruction, 50 times slower.
+//! `#[inline(always)]`. Loop bodies and profiles are methods of traits, not functions passed as values, and
+//! closures only where they store what a loop has at hand. Otherwise they would not be compiled into the
+//! dispatched function itself. Code outside it falls back to one call per instruction, 50 times slower.
 
 pub(crate) mod exp;
 

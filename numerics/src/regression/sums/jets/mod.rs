@@ -131,6 +131,7 @@ impl Jets {
     /// checked that the kernel has the derivatives asked for (`check_smooth_at`).
     ///
     /// # Errors
+    /// [`NumericsError::DimensionMismatch`] for queries of another dimension than the points,
     /// [`NumericsError::Overflow`] if a result leaves float64, [`NumericsError::Cancelled`].
     pub fn evaluate(
         cloud: &Cloud,
@@ -155,6 +156,10 @@ impl Jets {
         order: JetOrder,
         observer: &dyn Observer,
     ) -> Result<Self> {
+        let (expected, found) = (nodes.dimension(), queries.dimension());
+        if expected != found {
+            return Err(NumericsError::DimensionMismatch { expected, found });
+        }
         let layout = Layout { order, dimension: nodes.dimension() };
         let (weights, width) = (blocked(weights), layout.width());
         let expansion = Expansion { nodes, kernel, weights: &weights };

@@ -91,6 +91,14 @@ fn every_instruction_set_sums_to_the_same_jets() {
 }
 
 #[test]
+fn queries_of_another_dimension_are_refused() {
+    let ((cloud, weights, _), (_, _, queries)) = (expansion(3), expansion(2));
+    let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
+    let found = Jets::evaluate(&cloud, &kernel, &weights, &queries, JetOrder::Value, &Unobserved);
+    assert!(matches!(found, Err(NumericsError::DimensionMismatch { expected: 3, found: 2 })));
+}
+
+#[test]
 fn half_of_the_pairs_give_the_jets_at_the_points() {
     // The sizes are less than a block, one block, one block and a point, an odd and an even number of blocks.
     for (n, d) in [(1, 3), (128, 3), (129, 1), (300, 2), (500, 3)] {
