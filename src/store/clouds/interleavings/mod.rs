@@ -214,8 +214,9 @@ const DIRECTORY: Setting = Setting { n_processes: 1, tells_absence: true, n_byte
 
 const TWO_PROCESSES: Setting = Setting { n_processes: 2, ..DIRECTORY };
 
-/// Runs every pair of requests, the second of them by the last process.
-async fn exhaust_pairs(setting: Setting) {
+/// Runs every pair of requests, the second of them by the last process. Fewer interleavings than there were
+/// once mean that the store has fewer steps, or that the test no longer stops at them.
+async fn exhaust_pairs(setting: Setting, at_least: usize) {
     use Request::{Delete, Get, List, Post};
     let mut n_ways = 0;
     for pair in [[Post, Post], [Post, Delete], [Delete, Delete], [Get, Delete], [List, Delete], [List, Post]]
@@ -223,27 +224,27 @@ async fn exhaust_pairs(setting: Setting) {
         n_ways += exhaust(setting, &[(pair[0], 0), (pair[1], setting.n_processes - 1)]).await;
     }
     println!("{n_ways} interleavings");
-    assert!(n_ways > 100, "{n_ways}");
+    assert!(n_ways >= at_least, "{n_ways}");
 }
 
 #[tokio::test]
 async fn every_interleaving_of_two_requests_leaves_one_truth() {
-    exhaust_pairs(DIRECTORY).await;
+    exhaust_pairs(DIRECTORY, 150).await;
 }
 
 #[tokio::test]
 async fn every_interleaving_of_two_requests_leaves_one_truth_where_memory_keeps_nothing() {
-    exhaust_pairs(Setting { n_bytes: 0, ..DIRECTORY }).await;
+    exhaust_pairs(Setting { n_bytes: 0, ..DIRECTORY }, 2_500).await;
 }
 
 #[tokio::test]
 async fn every_interleaving_of_requests_of_two_processes_leaves_one_truth() {
-    exhaust_pairs(TWO_PROCESSES).await;
+    exhaust_pairs(TWO_PROCESSES, 20_000).await;
 }
 
 #[tokio::test]
 async fn every_interleaving_of_requests_of_two_processes_leaves_one_truth_where_memory_keeps_nothing() {
-    exhaust_pairs(Setting { n_bytes: 0, ..TWO_PROCESSES }).await;
+    exhaust_pairs(Setting { n_bytes: 0, ..TWO_PROCESSES }, 40_000).await;
 }
 
 #[tokio::test]
