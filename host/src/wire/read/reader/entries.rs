@@ -71,21 +71,14 @@ impl<'r, 'a> Entries<'r, 'a> {
     #[inline(never)]
     pub(super) fn read_numbers(mut self, numbers: &mut Vec<f64>) -> Result<(), Error> {
         numbers.clear();
-        loop {
-            if self.n_left == 0 && !self.is_granted_more()? {
-                return self.count(None);
-            }
-            let number = match self.goes_on() {
-                Ok(true) => self.number(),
-                Ok(false) => return Ok(()),
-                Err(error) => Err(error),
-            };
-            match number {
+        while self.has_next()? {
+            match self.number() {
                 Ok(number) => numbers.push(number),
                 Err(error) => return Err(self.reader.passed(self.length(), error)),
             }
             self.n_left -= 1;
         }
+        Ok(())
     }
 
     /// Reads the next entry, which is a number.
@@ -94,6 +87,18 @@ impl<'r, 'a> Entries<'r, 'a> {
         match self.source_of_entry {
             Source::Text if self.reader.text.is_number() => self.reader.text.number(),
             _ => f64::deserialize(self.value()),
+        }
+    }
+
+    /// Whether another entry is to be read. Entries beyond the limit are only counted.
+    #[inline(always)]
+    fn has_next(&mut self) -> Result<bool, Error> {
+        if self.n_left == 0 && !self.is_granted_more()? {
+            return self.count(None).map(|()| false);
+        }
+        match self.goes_on() {
+            Ok(goes_on) => Ok(goes_on),
+            Err(error) => Err(self.reader.passed(self.length(), error)),
         }
     }
 
@@ -192,15 +197,10 @@ impl<'a> SeqAccess<'a> for Entries<'_, 'a> {
 
     #[inline(always)]
     fn next_element_seed<S: DeserializeSeed<'a>>(&mut self, seed: S) -> Result<Option<S::Value>, Error> {
-        if self.n_left == 0 && !self.is_granted_more()? {
-            return self.count(None).map(|()| None);
+        if !self.has_next()? {
+            return Ok(None);
         }
-        let entry = match self.goes_on() {
-            Ok(true) => seed.deserialize(self.value()),
-            Ok(false) => return Ok(None),
-            Err(error) => Err(error),
-        };
-        match entry {
+        match seed.deserialize(self.value()) {
             Ok(entry) => {
                 self.n_left -= 1;
                 if self.list_of_entry == List::ROW
