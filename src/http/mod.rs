@@ -49,18 +49,19 @@ pub async fn serve(
 
 /// Returns the service as one router, and the runner of its jobs.
 pub fn router(app: Arc<App>) -> (Router, Runner) {
-    let (v1, probes, document) = parts();
+    let Parts { at_once, long, probes, document } = parts();
     let recover = || CatchPanicLayer::custom(middleware::recover as fn(_) -> _);
     let runner =
-        Runner { host: app.host.clone(), routes: v1.clone().layer(recover()).with_state(app.clone()) };
+        Runner { host: app.host.clone(), routes: long.clone().layer(recover()).with_state(app.clone()) };
     let document = openapi::to_value(&document);
     let document_3_1 = serve_json(openapi::to_text(&document).into());
     let document_3_0 = serve_json(openapi::to_text(&version_3_0::derive(document)).into());
-    let v1 = v1
-        .layer(from_fn_with_state(app.host.clone(), middleware::meet_deadline))
+    let deadline = || from_fn_with_state(app.host.clone(), middleware::meet_deadline);
+    let router = long
+        .layer(deadline())
         .layer(from_fn_with_state(runner.clone(), jobs::respond_async))
-        .layer(from_fn_with_state(app.host.clone(), authentication::authenticate));
-    let router = v1
+        .merge(at_once.layer(deadline()))
+        .layer(from_fn_with_state(app.host.clone(), authentication::authenticate))
         .merge(probes)
         .route("/page/{*path}", get(viewer::get_page_file))
         .route("/openapi.json", document_3_1)
@@ -84,17 +85,28 @@ fn serve_json(text: bytes::Bytes) -> MethodRouter<Arc<App>> {
 
 /// Returns the OpenAPI document of this version, as JSON.
 pub fn openapi_json() -> String {
-    openapi::to_text(&openapi::to_value(&parts().2))
+    openapi::to_text(&openapi::to_value(&parts().document))
 }
 
 /// Returns the OpenAPI document in version 3.0, as JSON, for generators that do not know 3.1.
 pub fn openapi_3_0_json() -> String {
-    openapi::to_text(&version_3_0::derive(openapi::to_value(&parts().2)))
+    openapi::to_text(&version_3_0::derive(openapi::to_value(&parts().document)))
 }
 
-/// Returns the routes behind keys, the routes for everyone, and the document of both.
-fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
-    let v1 = OpenApiRouter::with_openapi(openapi::Document::openapi())
+/// All routes, and the document of them.
+struct Parts {
+    /// Routes behind keys whose work takes no longer than receiving the body. They ignore that a job is
+    /// preferred.
+    at_once: Router<Arc<App>>,
+    /// The other routes behind keys.
+    long: Router<Arc<App>>,
+    /// Routes for everyone.
+    probes: Router<Arc<App>>,
+    document: utoipa::openapi::OpenApi,
+}
+
+fn parts() -> Parts {
+    let at_once = OpenApiRouter::with_openapi(openapi::Document::openapi())
         .routes(routes!(clouds::create_cloud, clouds::list_clouds))
         .routes(routes!(clouds::get_cloud, clouds::check_cloud, clouds::delete_cloud))
         .routes(routes!(kernels::list_kernels))
@@ -102,8 +114,9 @@ fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
         .routes(routes!(coarse::choose_coarse_cloud))
         .routes(routes!(sides::choose_sides))
         .routes(routes!(job_routes::get_job, job_routes::delete_job))
-        .layer(from_fn(middleware::negotiate))
-        // The routes below compute or return computed results, and negotiate formats themselves.
+        .layer(from_fn(middleware::negotiate));
+    // They compute or return computed results, and negotiate formats themselves.
+    let long = OpenApiRouter::new()
         .routes(routes!(job_routes::follow_job))
         .routes(routes!(job_routes::get_job_result))
         .routes(routes!(interpolation::compute_interpolation))
@@ -129,13 +142,15 @@ fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
         .routes(routes!(viewer::get_start_page))
         .routes(routes!(pages::list_problem_pages))
         .routes(routes!(pages::get_problem_page));
-    let (v1, mut document) = v1.split_for_parts();
+    let (at_once, mut document) = at_once.split_for_parts();
+    let (long, of_long) = long.split_for_parts();
     let (probes, mut of_probes) = probes.split_for_parts();
+    document.merge(of_long);
     openapi::set_security(&mut document, true);
     openapi::set_security(&mut of_probes, false);
     document.merge(of_probes);
     openapi::complete(&mut document);
-    (v1, probes, document)
+    Parts { at_once, long, probes, document }
 }
 
 /// CORS headers, added only where origins are configured. Without them, OPTIONS is a method that no path

@@ -34,12 +34,10 @@ static KEPT_HEADERS: [HeaderName; 4] =
 /// Header with the trace that the work on the job belongs to.
 const TRACE: &str = "traceparent";
 
-/// Routes that ignore the preference, because their work takes no longer than receiving the body.
-const AT_ONCE: [&str; 4] = ["/v1/clouds", "/v1/estimate", "/v1/coarse", "/v1/sides"];
-
-/// Answers 202 to a POST that prefers so, and computes its answer in the background.
+/// Answers 202 to a POST that prefers so, and computes its answer in the background. A layer of the routes
+/// whose work may take longer than receiving the body.
 pub async fn respond_async(State(runner): State<Runner>, request: Request, next: Next) -> Response {
-    let may_be_long = request.method() == Method::POST && !AT_ONCE.contains(&request.uri().path());
+    let may_be_long = request.method() == Method::POST;
     // A request without a route is refused at once.
     let has_route = request.extensions().get::<MatchedPath>().is_some();
     if !may_be_long || !has_route || !prefers_async(request.headers()) {
