@@ -15,6 +15,7 @@ pub struct AnswerHeaders {
     stages: StageTimes,
     /// Encoding time, absent if encoding continues while the answer is sent.
     encode: Option<Duration>,
+    /// Absent if the answer needed nothing that is kept.
     cache: Option<CacheOutcome>,
     /// Id of the subject of the answer, in the header that the service defines.
     subject: Option<(HeaderName, HeaderValue)>,
@@ -54,17 +55,12 @@ impl AnswerHeaders {
 
     /// Adds the headers to a response.
     pub fn head(&self, mut response: Response) -> Response {
-        let outcome = self.cache.unwrap_or(CacheOutcome::Hit);
-        // For the metrics.
-        response.extensions_mut().insert(outcome);
+        if let Some(outcome) = self.cache {
+            // For the metrics.
+            response.extensions_mut().insert(outcome);
+            response.headers_mut().insert("cache-status", HeaderValue::from_static(status_of(outcome)));
+        }
         let headers = response.headers_mut();
-        let cache = match outcome {
-            CacheOutcome::Hit => "gramian; hit",
-            CacheOutcome::Collapsed => "gramian; fwd=miss; collapsed",
-            CacheOutcome::Stored => "gramian; fwd=miss; stored",
-            CacheOutcome::NotStored => "gramian; fwd=miss",
-        };
-        headers.insert("cache-status", HeaderValue::from_static(cache));
         if let Some((header, id)) = &self.subject {
             headers.insert(header.clone(), id.clone());
         }
@@ -87,5 +83,15 @@ impl AnswerHeaders {
             time.map(|time| format!("{name};dur={:.3}", time.as_secs_f64() * 1e3))
         };
         stages.into_iter().filter_map(entry).collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// The outcome as RFC 9211 writes it.
+fn status_of(outcome: CacheOutcome) -> &'static str {
+    match outcome {
+        CacheOutcome::Hit => "gramian; hit",
+        CacheOutcome::Collapsed => "gramian; fwd=miss; collapsed",
+        CacheOutcome::Stored => "gramian; fwd=miss; stored",
+        CacheOutcome::NotStored => "gramian; fwd=miss",
     }
 }

@@ -10,6 +10,8 @@ use crate::memory::budget::Reservation;
 use crate::problem::Problem;
 use crate::state::host::Host;
 use crate::wire::negotiation::Format;
+use crate::wire::read::body::UnpackedBody;
+use crate::wire::read::limits::ParseContext;
 use crate::wire::write::answer::Answer as Members;
 use gramian_observer::Price;
 
@@ -23,29 +25,34 @@ pub trait Operation: DeserializeOwned + Send + 'static {
 
     type Answer: Members + 'static;
 
+    /// What requests are checked against, such as limits of the service.
+    type Context: Send + 'static;
+
     /// Checks the request, as far as that needs no computation, and prices the work and its answer.
     ///
     /// # Errors
     /// Returns the [`Problem`] for the client.
-    fn plan(&self) -> Result<Price, Problem>;
+    fn plan(&self, context: &Self::Context) -> Result<Price, Problem>;
 
     /// Computes the answer on the pool.
     ///
     /// # Errors
     /// Returns the [`Problem`] for the client.
-    fn compute(self, observer: &JobObserver) -> Result<Self::Answer, Problem>;
+    fn compute(self, context: &Self::Context, observer: &JobObserver) -> Result<Self::Answer, Problem>;
 }
 
-/// Returns an operation as it is served.
-pub fn operation<O: Operation>() -> AnyOperation {
-    AnyOperation {
-        name: O::NAME,
-        formats: O::FORMATS,
-        parse: Box::new(|body, context| Ok(Box::new(Parsed(body.parse::<O>(context)?)))),
-    }
+/// Returns an operation as it is served to one request.
+pub fn operation<O: Operation>(context: O::Context) -> AnyOperation {
+    let parse = |body: &UnpackedBody, parsing: &ParseContext<'_>| -> Result<Box<dyn AnyRequest>, Problem> {
+        Ok(Box::new(Parsed { request: body.parse::<O>(parsing)?, context }))
+    };
+    AnyOperation { name: O::NAME, formats: O::FORMATS, parse: Box::new(parse) }
 }
 
-struct Parsed<O>(O);
+struct Parsed<O: Operation> {
+    request: O,
+    context: O::Context,
+}
 
 impl<O: Operation> AnyRequest for Parsed<O> {
     fn begin(
@@ -54,9 +61,9 @@ impl<O: Operation> AnyRequest for Parsed<O> {
         intake: Reservation,
         observer: &JobObserver,
     ) -> Result<Next, Problem> {
-        let Parsed(request) = *self;
-        let Price { n_bytes, flops } = request.plan()?;
-        let priced = Priced { request, n_bytes, flops, intake };
+        let price = self.request.plan(&self.context)?;
+        let Price { n_bytes, flops } = price;
+        let priced = Priced { parsed: *self, price, intake };
         if call.wanted.is_none() || !is_light(flops) {
             return Ok(Next::Step(Box::new(priced)));
         }
@@ -68,19 +75,18 @@ impl<O: Operation> AnyRequest for Parsed<O> {
 }
 
 /// A request whose price is known.
-struct Priced<O> {
-    request: O,
-    n_bytes: usize,
-    flops: f64,
+struct Priced<O: Operation> {
+    parsed: Parsed<O>,
+    price: Price,
     /// Memory of the request until its answer is computed.
     intake: Reservation,
 }
 
 impl<O: Operation> Priced<O> {
     fn ready(self, call: &Call, memory: Reservation) -> Ready {
-        let Self { request, flops, intake, .. } = self;
-        let work = |observer: &JobObserver| -> Result<Box<dyn Members>, Problem> {
-            Ok(Box::new(request.compute(observer)?))
+        let Self { parsed: Parsed { request, context }, price: Price { flops, .. }, intake } = self;
+        let work = move |observer: &JobObserver| -> Result<Box<dyn Members>, Problem> {
+            Ok(Box::new(request.compute(&context, observer)?))
         };
         let headers = AnswerHeaders::parsed_in(call.began.elapsed());
         Ready { work: Box::new(work), flops, intake, memory, headers }
@@ -90,7 +96,7 @@ impl<O: Operation> Priced<O> {
 impl<O: Operation> Step for Priced<O> {
     fn advance<'a>(self: Box<Self>, call: &'a Call) -> BoxFuture<'a, Result<Next, Problem>> {
         async move {
-            let Self { n_bytes, flops, .. } = *self;
+            let Price { n_bytes, flops } = self.price;
             call.check_deadline(Outlook { flops, n_bytes, is_cached: true })?;
             let memory = call.host.reserve(call.admission.owner, n_bytes).await?;
             self.ready(call, memory).answer(call).await.map(Next::Answer)

@@ -10,6 +10,7 @@ use axum::http::{StatusCode, header};
 use axum::middleware::from_fn_with_state;
 use axum::response::Response;
 use axum::routing::post;
+use futures_util::future::join_all;
 use safetensors::SafeTensors;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -60,15 +61,16 @@ answer! {
 impl Operation for Addition {
     const NAME: &'static str = "add";
     type Answer = Sums;
+    type Context = ();
 
-    fn plan(&self) -> Result<Price, Problem> {
+    fn plan(&self, (): &()) -> Result<Price, Problem> {
         if self.values.is_empty() {
             return Err(Problem::invalid_request("/values", "there is nothing to add"));
         }
         Ok(Price { n_bytes: self.n_bytes, flops: self.flops })
     }
 
-    fn compute(self, observer: &JobObserver) -> Result<Sums, Problem> {
+    fn compute(self, (): &(), observer: &JobObserver) -> Result<Sums, Problem> {
         if self.is_endless {
             BEGUN.fetch_add(1, SeqCst);
             while !observer.is_cancelled() {
@@ -89,7 +91,7 @@ async fn add(
     Extension(owner): Extension<Owner>,
     request: Request,
 ) -> Result<Response, Problem> {
-    let operation: AnyOperation = operation::<Addition>();
+    let operation: AnyOperation = operation::<Addition>(());
     serve(host, owner, request, operation).await
 }
 
@@ -123,7 +125,7 @@ async fn a_sum_is_answered_in_each_format() {
     let body = json!({"values": [1, 2, 3.5]});
     let response = ask(&host, &body).await;
     assert_eq!(response.status(), StatusCode::OK);
-    assert_eq!(response.headers()["cache-status"], "gramian; hit");
+    assert!(!response.headers().contains_key("cache-status"));
     assert!(response.headers()["server-timing"].to_str().unwrap().starts_with("parse;dur="));
     assert_eq!(json_of(response).await, json!({"partial": [1.0, 3.0, 6.5], "sum": 6.5}));
     let mut tensors = request(&body);
@@ -145,6 +147,20 @@ async fn work_of_any_size_has_the_same_answer() {
     let asked = |flops: f64| json!({"values": [1, 2], "n_bytes": 1 << 20, "flops": flops});
     for flops in [0.0, 1e8, 1e12] {
         assert_eq!(json_of(ask(&host, &asked(flops)).await).await["sum"], 3.0);
+    }
+    assert_eq!((host.work.n_held(), host.intake.n_held()), (0, 0));
+}
+
+#[tokio::test]
+async fn eight_equal_requests_at_once_are_all_answered() {
+    let host = host(&[]);
+    for flops in [0.0, 1e9] {
+        // Together they want twice the memory that there is, so some wait for what others give back.
+        let body = json!({"values": [1, 2], "n_bytes": 8 << 20, "flops": flops});
+        let asked = (0..8).map(|_| async { json_of(ask(&host, &body).await).await });
+        for answer in join_all(asked).await {
+            assert_eq!(answer["sum"], 3.0, "{answer}");
+        }
     }
     assert_eq!((host.work.n_held(), host.intake.n_held()), (0, 0));
 }

@@ -61,6 +61,7 @@ fn names_on_success(operation: &Operation) -> Vec<&'static str> {
         "create_cloud" => vec!["Location", "Gramian-Cloud"],
         "get_cloud" | "check_cloud" => vec!["ETag", "Gramian-Cloud"],
         "get_start_page" => vec!["ETag"],
+        "choose_coarse_cloud" | "choose_sides" => vec!["Server-Timing"],
         "get_job_result" => vec!["Server-Timing", "Cache-Status", "Gramian-Cloud"],
         _ if is_computed(operation) => vec!["Server-Timing", "Cache-Status", "Gramian-Cloud"],
         _ => vec![],

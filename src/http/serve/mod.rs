@@ -4,7 +4,6 @@ pub mod operation;
 pub mod steps;
 
 pub mod answers;
-pub mod direct;
 pub mod durable;
 
 pub mod fitted;

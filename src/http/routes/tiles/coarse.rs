@@ -5,17 +5,19 @@ use std::sync::Arc;
 use axum::Extension;
 use axum::extract::{Request, State};
 use axum::response::Response;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use utoipa::ToSchema;
 
 use crate::http::fields::KernelUsed;
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::{Pointers, Problem, from_numerics};
-use crate::http::serve::direct::{DirectOperation, serve};
-use crate::http::serve::planner::Planner;
+use crate::http::serve::planner::unregistered;
 use crate::http::state::app::App;
+use gramian_host::answer;
 use gramian_host::compute::JobObserver;
 use gramian_host::memory::Owner;
+use gramian_host::operation::{Operation, operation, serve};
+use gramian_host::wire::negotiation::Format;
 use gramian_host::wire::read::points::Points;
 use gramian_numerics::machine::price::Price;
 use gramian_numerics::regression::sums::regularization::Regularization;
@@ -37,15 +39,16 @@ pub struct CoarseRequest {
     pub noise_deviation: Option<f64>,
 }
 
-/// A coarse cloud with the kernel and alpha of its signature function.
-#[derive(Serialize, ToSchema)]
-pub struct CoarseResponse {
-    /// The points, by their positions in the cloud, ascending. No two coincide.
-    points: Vec<usize>,
-    /// The kernel of the signature function.
-    kernel: KernelUsed,
-    /// Added to the diagonal of its matrix.
-    alpha: f64,
+answer! {
+    /// A coarse cloud with the kernel and alpha of its signature function.
+    pub struct CoarseResponse {
+        /// The points, by their positions in the cloud, ascending. No two coincide.
+        points: Vec<usize>,
+        /// The kernel of the signature function.
+        kernel: KernelUsed,
+        /// Added to the diagonal of its matrix.
+        alpha: f64,
+    }
 }
 
 /// Choose a coarse cloud
@@ -65,26 +68,28 @@ pub async fn choose_coarse_cloud(
     Extension(owner): Extension<Owner>,
     request: Request,
 ) -> Result<Response, Problem> {
-    serve::<CoarseRequest>(app, owner, request).await
+    serve(app.host.clone(), owner, request, operation::<CoarseRequest>(app)).await
 }
 
-impl DirectOperation for CoarseRequest {
+impl Operation for CoarseRequest {
     const NAME: &'static str = "choose_coarse_cloud";
+    const FORMATS: &'static [Format] = &[Format::Json];
     type Answer = CoarseResponse;
+    type Context = Arc<App>;
 
-    fn price(&self) -> Price {
-        coarse_price(self.points.n_rows, self.points.dimension, self.count)
-    }
-
-    fn compute(self, planner: &Planner<'_>, observer: &JobObserver) -> Result<CoarseResponse, Problem> {
-        let noise = self.noise_deviation.unwrap_or_default();
-        if noise < 0.0 {
+    fn plan(&self, _: &Arc<App>) -> Result<Price, Problem> {
+        if self.noise_deviation.is_some_and(|noise| noise < 0.0) {
             return Err(Problem::invalid_request("/noise_deviation", "must be 0 or more"));
         }
         if self.count == Some(0) {
             return Err(Problem::invalid_request("/count", "must be 1 or more"));
         }
-        let cloud = planner.unregistered(self.points, "/points")?;
+        Ok(coarse_price(self.points.n_rows, self.points.dimension, self.count))
+    }
+
+    fn compute(self, app: &Arc<App>, observer: &JobObserver) -> Result<CoarseResponse, Problem> {
+        let noise = self.noise_deviation.unwrap_or_default();
+        let cloud = unregistered(app, self.points, "/points")?;
         let refuse = |error| from_numerics(error, Pointers { points: "/points", ..Pointers::REQUEST });
         let coarse = CoarseCloud::of(&cloud, self.count, noise, observer).map_err(refuse)?;
         if Regularization::uniform(coarse.alpha).is_err() {

@@ -5,17 +5,18 @@ use std::sync::Arc;
 use axum::Extension;
 use axum::extract::{Request, State};
 use axum::response::Response;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use utoipa::ToSchema;
 
 use super::fields::{Border, Region};
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::{Pointers, Problem, from_numerics};
-use crate::http::serve::direct::{DirectOperation, serve};
-use crate::http::serve::planner::Planner;
 use crate::http::state::app::App;
+use gramian_host::answer;
 use gramian_host::compute::JobObserver;
 use gramian_host::memory::Owner;
+use gramian_host::operation::{Operation, operation, serve};
+use gramian_host::wire::negotiation::Format;
 use gramian_numerics::machine::price::Price;
 use gramian_numerics::orientation::tiles::{self, Tiling, TilingSize};
 
@@ -51,13 +52,14 @@ pub struct TileRegions {
     pub n_edges: usize,
 }
 
-/// The sides of regions, in the order of the request.
-#[derive(Serialize, ToSchema)]
-pub struct SidesResponse {
-    /// 1 or −1 for each region: the sign to multiply its normals with.
-    signs: Vec<i8>,
-    /// True for each region whose side is nearly a matter of chance.
-    are_doubtful: Vec<bool>,
+answer! {
+    /// The sides of regions, in the order of the request.
+    pub struct SidesResponse {
+        /// 1 or −1 for each region: the sign to multiply its normals with.
+        signs: Vec<i8>,
+        /// True for each region whose side is nearly a matter of chance.
+        are_doubtful: Vec<bool>,
+    }
 }
 
 /// Join the regions of tiles
@@ -76,14 +78,16 @@ pub async fn choose_sides(
     Extension(owner): Extension<Owner>,
     request: Request,
 ) -> Result<Response, Problem> {
-    serve::<SidesRequest>(app, owner, request).await
+    serve(app.host.clone(), owner, request, operation::<SidesRequest>(())).await
 }
 
-impl DirectOperation for SidesRequest {
+impl Operation for SidesRequest {
     const NAME: &'static str = "choose_sides";
+    const FORMATS: &'static [Format] = &[Format::Json];
     type Answer = SidesResponse;
+    type Context = ();
 
-    fn price(&self) -> Price {
+    fn plan(&self, (): &()) -> Result<Price, Problem> {
         let of_region = |region: &Region| {
             region.centre.len() + region.normal.len() + region.lower.len() + region.upper.len()
         };
@@ -93,10 +97,10 @@ impl DirectOperation for SidesRequest {
             size.n_borders += tile.borders.len();
             size.n_coordinates += tile.regions.iter().map(of_region).sum::<usize>();
         }
-        tiles::sides_price(size)
+        Ok(tiles::sides_price(size))
     }
 
-    fn compute(self, _: &Planner<'_>, observer: &JobObserver) -> Result<SidesResponse, Problem> {
+    fn compute(self, (): &(), observer: &JobObserver) -> Result<SidesResponse, Problem> {
         let tiles: Vec<tiles::TileRegions> = self.tiles.into_iter().map(TileRegions::into).collect();
         let refuse = |error| from_numerics(error, Pointers::REQUEST);
         let links: Vec<[usize; 2]> = self.links.iter().map(|link| [link.first, link.second]).collect();

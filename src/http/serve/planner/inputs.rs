@@ -9,6 +9,7 @@ use crate::http::fields::limits::{too_many_coordinates, too_many_points, too_man
 use crate::http::problem::{self, Problem, catalogue};
 use crate::http::serve::durable::TRUST;
 use crate::http::serve::plan::FittedCloud;
+use crate::http::state::app::App;
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::CloudId;
 use gramian_host::problem::slug::Slug;
@@ -108,23 +109,6 @@ impl Planner<'_> {
         }
     }
 
-    /// Validates points that are used once, at this pointer.
-    ///
-    /// # Errors
-    /// 413 beyond the limits, 422 for an invalid cloud.
-    pub fn unregistered(&self, points: Points, pointer: &str) -> Result<Cloud, Problem> {
-        let cloud = rectangular(points, pointer, catalogue::INVALID_CLOUD)?;
-        let (limit, required) = (self.app.config.max_points, cloud.n_points());
-        if required > limit {
-            return Err(too_many_points(limit, required).at(pointer));
-        }
-        let (limit, required) = (self.app.config.max_dimension, cloud.dimension());
-        if required > limit {
-            return Err(too_many_coordinates(limit, required, cloud.n_points()).at(pointer));
-        }
-        Ok(cloud)
-    }
-
     /// Validates and registers points. Returns whether they are new.
     ///
     /// # Errors
@@ -135,7 +119,7 @@ impl Planner<'_> {
         normals: Option<Points>,
         pointer: &str,
     ) -> Result<(Arc<RegisteredCloud>, bool), Problem> {
-        let cloud = self.unregistered(points, &format!("{pointer}/points"))?;
+        let cloud = unregistered(self.app, points, &format!("{pointer}/points"))?;
         let normals = match normals {
             None => None,
             Some(normals) => Some(check_normals(normals, &cloud, &format!("{pointer}/normals"))?),
@@ -147,6 +131,23 @@ impl Planner<'_> {
         }
         Ok((stored, is_new))
     }
+}
+
+/// Validates points that are used once, at this pointer.
+///
+/// # Errors
+/// 413 beyond the limits, 422 for an invalid cloud.
+pub fn unregistered(app: &App, points: Points, pointer: &str) -> Result<Cloud, Problem> {
+    let cloud = rectangular(points, pointer, catalogue::INVALID_CLOUD)?;
+    let (limit, required) = (app.config.max_points, cloud.n_points());
+    if required > limit {
+        return Err(too_many_points(limit, required).at(pointer));
+    }
+    let (limit, required) = (app.config.max_dimension, cloud.dimension());
+    if required > limit {
+        return Err(too_many_coordinates(limit, required, cloud.n_points()).at(pointer));
+    }
+    Ok(cloud)
 }
 
 /// Finds the first site that is not a point of the cloud.

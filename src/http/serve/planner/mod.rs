@@ -31,7 +31,7 @@ use gramian_numerics::regression::solver::trend::Mean;
 use gramian_numerics::surface::geometry::{GeometryRequest, SurfaceModel};
 use gramian_numerics::surface::local::Learning;
 use inputs::length_mismatch;
-pub use inputs::{GivenValues, check_seed, unknown_cloud, value_lists};
+pub use inputs::{GivenValues, check_seed, unknown_cloud, unregistered, value_lists};
 pub use landmarks::{LandmarkProbe, ValuesUse};
 
 /// Planner of one request. It validates the parts of the request against the limits and the stored clouds.
