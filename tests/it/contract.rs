@@ -15,6 +15,7 @@ mod answer;
 mod closed;
 mod document;
 mod tests;
+mod validator;
 
 use std::sync::LazyLock;
 
@@ -23,6 +24,7 @@ use serde_json::{Value, json};
 
 pub use answer::{Received, decompressed};
 use document::{Contract, Operation, Response, Served};
+use validator::Validator;
 
 /// Paths outside the interface, with everything below them: pages for people, and the documents themselves.
 const BESIDE: [&str; 4] = ["/docs", "/openapi.json", "/openapi-3.0.json", "/page"];
@@ -164,7 +166,7 @@ fn of_headers(response: &Response, answer: &Received) -> Vec<String> {
                 // Values are text. Those declared as numbers, such as Retry-After, are parsed as numbers.
                 let text = json!(value);
                 let number = serde_json::from_str(value).ok().filter(Value::is_number);
-                let value = number.filter(|_| !header.schema.is_valid(&text)).unwrap_or(text);
+                let value = number.filter(|_| !header.schema.errors(&text).is_empty()).unwrap_or(text);
                 found.extend(violations(name, &header.schema, &value));
             }
         }
@@ -206,7 +208,6 @@ fn no_body(answer: &Received) -> Vec<String> {
 
 /// Returns the violations of a schema, by JSON pointer. At most five, since one mistake may repeat in every
 /// entry of an array.
-fn violations(name: &str, schema: &jsonschema::Validator, value: &Value) -> Vec<String> {
-    let errors = schema.iter_errors(value).take(5);
-    errors.map(|error| format!("{name}{}: {:.500}", error.instance_path(), error.to_string())).collect()
+fn violations(name: &str, schema: &Validator, value: &Value) -> Vec<String> {
+    schema.errors(value).into_iter().take(5).map(|error| format!("{name}{error:.500}")).collect()
 }

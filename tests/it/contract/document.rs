@@ -3,10 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
 
-use jsonschema::{Draft, Validator};
 use serde_json::{Map, Value};
 
 use super::closed::{close_parts, closed};
+use super::validator::Validator;
 
 pub struct Contract {
     paths: Vec<Path>,
@@ -150,8 +150,7 @@ impl<'a> Schemas<'a> {
         let mut used = if schema.is_null() { Value::Bool(true) } else { schema.clone() };
         closed(&mut used);
         let root = serde_json::json!({"allOf": [used], "components": self.components});
-        let options = jsonschema::options().with_draft(Draft::Draft202012).should_validate_formats(true);
-        let validator = Arc::new(options.build(&root).unwrap_or_else(|error| panic!("{error}: {schema}")));
+        let validator = Arc::new(Validator::new(root).unwrap_or_else(|error| panic!("{error}: {schema}")));
         self.compiled.insert(schema.to_string(), validator.clone());
         validator
     }
