@@ -3,6 +3,7 @@
 use std::fmt;
 
 use gramian_host::memory::Owner;
+use gramian_host::wire::digest::update_with_floats;
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::model::Recipe;
@@ -205,18 +206,6 @@ fn update_with_hyperparameters(hasher: &mut blake3::Hasher, known: &SurfaceHyper
     for mixture in mixtures {
         hasher.update(&[mixture.len() as u8]);
         mixture.iter().for_each(|of| update_with_floats(hasher, &[of.ratio, of.log_share]));
-    }
-}
-
-/// Adds numbers to a hash. Bytes go through a stack buffer, because hashing number by number costs more than
-/// the hash.
-fn update_with_floats(hasher: &mut blake3::Hasher, numbers: &[f64]) {
-    let mut bytes = [0u8; 4096];
-    for chunk in numbers.chunks(bytes.len() / 8) {
-        for (slot, x) in bytes.chunks_exact_mut(8).zip(chunk) {
-            slot.copy_from_slice(&(x + 0.0).to_le_bytes());
-        }
-        hasher.update(&bytes[..chunk.len() * 8]);
     }
 }
 

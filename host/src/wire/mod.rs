@@ -1,6 +1,7 @@
 //! Bodies of requests and answers: content negotiation, compression, entity tags, reading and writing.
 
 pub mod compression;
+pub mod digest;
 pub mod etag;
 pub mod negotiation;
 pub mod read;
