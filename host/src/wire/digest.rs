@@ -2,8 +2,8 @@
 
 /// Adds numbers to a hash, little-endian, −0.0 as 0.0.
 ///
-/// Bytes go through a buffer on the stack, because hashing number by number costs more than the hash. The loop
-/// over them goes through all points of a request, so it is compiled here, at full speed.
+/// Bytes go through a buffer on the stack, because hashing number by number costs more than the hash. The
+/// loop goes through all points of a request, so it is compiled here, at full speed.
 #[inline(never)]
 pub fn update_with_floats(hasher: &mut blake3::Hasher, numbers: &[f64]) {
     let mut bytes = [0u8; 4096];
