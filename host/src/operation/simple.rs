@@ -25,7 +25,7 @@ pub trait Operation: DeserializeOwned + Send + 'static {
 
     type Answer: Members + 'static;
 
-    /// What requests are checked against, such as limits of the service.
+    /// Limits of the service, or whatever else is needed to check a request.
     type Context: Send + 'static;
 
     /// Checks the request, as far as that needs no computation, and prices the work and its answer.

@@ -1,4 +1,5 @@
-//! Bodies of requests and answers: content negotiation, compression, entity tags, reading and writing.
+//! Bodies of requests and answers: content negotiation, compression, entity tags, reading and writing; and
+//! the bytes of numbers in hashes.
 
 pub mod compression;
 pub mod digest;
