@@ -1,6 +1,6 @@
 //! Lists of points and lists of values, read into a flat buffer.
 
-use serde::de::{Deserialize, Deserializer, SeqAccess, Visitor};
+use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Unexpected, Visitor};
 
 /// Name of the type [`ValueLists`], by which a service tells that a member is such a list.
 pub const VALUE_LISTS: &str = "ValueLists";
@@ -83,8 +83,9 @@ struct Row<'a>(&'a mut Vec<f64>, &'static str);
 impl<'de> serde::de::DeserializeSeed<'de> for Row<'_> {
     type Value = ();
 
+    /// Asks for bytes, so that a format may give all coordinates in one piece.
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
-        deserializer.deserialize_seq(self)
+        deserializer.deserialize_bytes(self)
     }
 }
 
@@ -93,6 +94,12 @@ impl<'de> Visitor<'de> for Row<'_> {
 
     fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(self.1)
+    }
+
+    fn visit_bytes<E: Error>(self, coordinates: &[u8]) -> Result<(), E> {
+        let coordinates = bytemuck::try_cast_slice(coordinates);
+        self.0.extend_from_slice(coordinates.map_err(|_| E::invalid_type(Unexpected::Seq, &self.1))?);
+        Ok(())
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut coordinates: A) -> Result<(), A::Error> {

@@ -1,6 +1,6 @@
 //! Entries of a list: counted to the end, but kept only up to the limit.
 
-use serde::de::{Deserialize, DeserializeSeed, Error as _, IntoDeserializer, SeqAccess};
+use serde::de::{Deserialize, DeserializeSeed, Error as _, SeqAccess};
 use serde_json::Error;
 
 use super::Value;
@@ -13,7 +13,7 @@ use crate::wire::read::limits::{Excess, List};
 const ENTRIES_PER_GRANT: usize = 64;
 
 /// Refusal of entries that a type of a fixed length does not read.
-pub(super) const LONGER_THAN_EXPECTED: &str = "the list is longer than expected";
+const LONGER_THAN_EXPECTED: &str = "the list is longer than expected";
 
 /// The entries of a list, all counted, of which at most `max_length` are kept.
 pub(super) struct Entries<'r, 'a> {
@@ -222,23 +222,5 @@ impl<'a> SeqAccess<'a> for Entries<'_, 'a> {
             None => None,
         };
         expected.map(|length| length.min(self.max_length))
-    }
-}
-
-/// The numbers of a row that were not shown yet.
-pub(super) struct Numbers<'n>(pub(super) &'n [f64]);
-
-impl<'de> SeqAccess<'de> for Numbers<'_> {
-    type Error = Error;
-
-    #[inline(always)]
-    fn next_element_seed<S: DeserializeSeed<'de>>(&mut self, seed: S) -> Result<Option<S::Value>, Error> {
-        let Some((number, rest)) = self.0.split_first() else { return Ok(None) };
-        self.0 = rest;
-        seed.deserialize(number.into_deserializer()).map(Some)
-    }
-
-    fn size_hint(&self) -> Option<usize> {
-        Some(self.0.len())
     }
 }

@@ -36,7 +36,7 @@ use serde::forward_to_deserialize_any;
 use serde_json::Error;
 
 use super::limits::List;
-use entries::{Entries, LONGER_THAN_EXPECTED, Numbers};
+use entries::Entries;
 use object::{GIVEN_TWICE, Members};
 use source::{Source, Tables};
 pub use state::{Reader, Stop};
@@ -127,28 +127,9 @@ impl<'r, 'a> Value<'r, 'a> {
     /// Shows the list whose beginning was read to a visitor.
     #[inline(always)]
     fn visit_list<V: Visitor<'a>>(self, visitor: V) -> Result<V::Value, Error> {
-        if self.list == List::ROW {
-            return self.visit_row(visitor);
-        }
         let mut entries = Entries::new(self);
         let list = visitor.visit_seq(&mut entries)?;
         entries.end().map(|()| list)
-    }
-
-    /// Shows a row to a visitor. Its numbers are read first, all at once, by code that does not depend on the
-    /// visitor and so is compiled here, not with the types of the service.
-    #[inline(always)]
-    fn visit_row<V: Visitor<'a>>(self, visitor: V) -> Result<V::Value, Error> {
-        let Value { reader, source, list, depth } = self;
-        let mut numbers = std::mem::take(&mut reader.row);
-        Entries::new(Value { reader: &mut *reader, source, list, depth }).read_numbers(&mut numbers)?;
-        let mut row = Numbers(&numbers);
-        let shown = visitor.visit_seq(&mut row)?;
-        if !row.0.is_empty() {
-            return Err(Error::custom(LONGER_THAN_EXPECTED));
-        }
-        reader.row = numbers;
-        Ok(shown)
     }
 }
 
@@ -186,6 +167,28 @@ impl<'de> Deserializer<'de> for Value<'_, 'de> {
             Token::List => self.visit_list(visitor),
             other => Err(other.refused(&visitor)),
         }
+    }
+
+    /// Shows the numbers of a row in one piece, as the bytes of f64, and any other list entry by entry. The
+    /// numbers are read by code that does not depend on the visitor and so is compiled here, not with the types
+    /// of the service.
+    #[inline(always)]
+    fn deserialize_bytes<V: Visitor<'de>>(mut self, visitor: V) -> Result<V::Value, Error> {
+        if !self.opens_list() {
+            match self.token()? {
+                Token::List => {}
+                other => return Err(other.refused(&visitor)),
+            }
+        }
+        if self.list != List::ROW {
+            return self.visit_list(visitor);
+        }
+        let Value { reader, source, list, depth } = self;
+        let mut numbers = std::mem::take(&mut reader.row);
+        Entries::new(Value { reader: &mut *reader, source, list, depth }).read_numbers(&mut numbers)?;
+        let shown = visitor.visit_bytes(bytemuck::cast_slice(&numbers))?;
+        reader.row = numbers;
+        Ok(shown)
     }
 
     /// Recognizes lists that are known by their type instead of their name.
@@ -238,7 +241,7 @@ impl<'de> Deserializer<'de> for Value<'_, 'de> {
     }
 
     forward_to_deserialize_any! {
-        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 char str string bytes byte_buf unit unit_struct
+        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 char str string byte_buf unit unit_struct
         tuple tuple_struct map identifier
     }
 }
