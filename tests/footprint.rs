@@ -65,9 +65,9 @@ async fn what_the_stores_count_is_what_they_take() {
         growth("weights of 64 to 1,000 values", new_factors(), Factors::n_bytes, 60_000, keep_weights).await,
         growth("clouds of 10 to 300 points", new_clouds(), Clouds::n_bytes, 40_000, clouds(10, 300)).await,
         growth("clouds of 1,000 to 20,000", new_clouds(), Clouds::n_bytes, 900, clouds(1000, 20_000)).await,
-        growth("factors of 64 to 512 points", new_factors(), Factors::n_bytes, 600, factors(false, 64, 512))
+        growth("factors of 64 to 512 points", new_factors(), Factors::n_bytes, 1200, factors(false, 64, 512))
             .await,
-        growth("with their surfaces", new_factors(), Factors::n_bytes, 600, factors(true, 64, 512)).await,
+        growth("with their surfaces", new_factors(), Factors::n_bytes, 1500, factors(true, 64, 512)).await,
         growth("factors of 700 to 1,500", new_factors(), Factors::n_bytes, 150, factors(false, 700, 1500))
             .await,
     ];
