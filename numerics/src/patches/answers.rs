@@ -139,7 +139,8 @@ struct CurvatureSlots<'a> {
 }
 
 impl Slots<'_> {
-    fn put(&mut self, lane: usize, place: &Neighbourhood, estimate: &Estimate, d: usize, are_points: bool) {
+    fn put(&mut self, lane: usize, place: &Neighbourhood, estimate: &Estimate, is_point: bool) {
+        let d = self.normals.len() / self.heights.len();
         let k = d - 1;
         self.is_known[lane] = true;
         self.is_at_rim[lane] = place.is_at_rim;
@@ -148,9 +149,9 @@ impl Slots<'_> {
         self.shapes[lane * d * d..][..d * d].copy_from_slice(&shape);
         self.heights[lane] = -estimate.means[0] * place.radius;
         self.height_deviations[lane] = estimate.covariance[0].max(0.0).sqrt() * place.radius;
-        self.normal_deviations[lane] = estimate.normal_deviation(d, are_points);
+        self.normal_deviations[lane] = estimate.normal_deviation(d, is_point);
         if let Some(curvatures) = &mut self.curvatures {
-            let found = estimate.curvatures(d, are_points);
+            let found = estimate.curvatures(d, is_point);
             let principal = curvatures.principal[lane * k..][..k].iter_mut();
             principal.zip(&found.principal).for_each(|(slot, deviation)| *slot = deviation / place.radius);
             curvatures.mean[lane] = found.mean / place.radius;
@@ -161,15 +162,15 @@ impl Slots<'_> {
 }
 
 impl Patches {
-    /// Computes normals, curvatures and deviations at queries. `are_points` says that the queries are points
-    /// of the cloud, with their noise.
+    /// Computes normals, curvatures and deviations at queries. `is_point` says which of them are points
+    /// of the cloud, with their noise. The others are places that are known exactly.
     ///
     /// # Errors
     /// `NumericsError::Cancelled`.
     pub fn at(
         &self,
         queries: &Cloud,
-        are_points: bool,
+        is_point: &(dyn Fn(usize) -> bool + Sync),
         with_deviations: bool,
         observer: &dyn Observer,
     ) -> Result<PatchGeometry> {
@@ -185,11 +186,13 @@ impl Patches {
             |room, (batch, mut slots)| {
                 observer.checkpoint()?;
                 let first = batch * lanes;
-                let places = room.put(queries, first..(first + lanes).min(m));
-                let estimates = self.estimates(room, &places, are_points);
+                let batch = first..(first + lanes).min(m);
+                let are_points: SmallVec<[bool; MAX_LANES]> = batch.clone().map(is_point).collect();
+                let places = room.put(queries, batch);
+                let estimates = self.estimates(room, &places, &are_points);
                 for (lane, (place, estimate)) in places.iter().zip(&estimates).enumerate() {
                     if let (Some(place), Some(estimate)) = (place, estimate) {
-                        slots.put(lane, place, estimate, d, are_points);
+                        slots.put(lane, place, estimate, are_points[lane]);
                     }
                 }
                 Ok::<_, NumericsError>(())
@@ -205,7 +208,7 @@ impl Patches {
         &self,
         room: &mut Room<'_>,
         places: &[Option<Neighbourhood>],
-        are_points: bool,
+        are_points: &[bool],
     ) -> Estimates {
         let mut estimates: Estimates = places.iter().map(|_| None).collect();
         for mixture in [&self.quartic, &self.models] {
@@ -216,13 +219,16 @@ impl Patches {
             }
         }
         let d = self.support.cloud().dimension();
-        let is_flat = |estimate: &Estimate| estimate.normal_deviation(d, are_points) < FLAT;
-        if self.stiff.is_empty() || !estimates.iter().flatten().any(is_flat) {
+        let is_flat = |(estimate, &is_point): (&Option<Estimate>, &bool)| {
+            estimate.as_ref().is_some_and(|estimate| estimate.normal_deviation(d, is_point) < FLAT)
+        };
+        let are_flat: SmallVec<[bool; MAX_LANES]> = estimates.iter().zip(are_points).map(is_flat).collect();
+        if self.stiff.is_empty() || !are_flat.contains(&true) {
             return estimates;
         }
         let stiff = mixed(room, places, &self.stiff);
-        for (estimate, stiff) in estimates.iter_mut().zip(stiff) {
-            if let Some(estimate) = estimate.as_mut().filter(|estimate| is_flat(estimate)) {
+        for ((estimate, stiff), is_flat) in estimates.iter_mut().zip(stiff).zip(are_flat) {
+            if let Some(estimate) = estimate.as_mut().filter(|_| is_flat) {
                 estimate.take_slopes(stiff, d);
             }
         }

@@ -152,7 +152,7 @@ impl Patches {
     /// Returns the largest deviation of a principal curvature at each site, 1/L, infinite where there is
     /// none.
     fn deviations(&self, sites: &Cloud, observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
-        let PatchGeometry { is_known, curvatures, .. } = self.at(sites, true, true, observer)?;
+        let PatchGeometry { is_known, curvatures, .. } = self.at(sites, &|_| true, true, observer)?;
         let of_curvatures = curvatures.unwrap_or_default().principal;
         let rows = is_known.iter().zip(of_curvatures.chunks_exact(sites.dimension() - 1));
         let largest = |row: &[f64]| row.iter().copied().fold(0.0, f64::max);

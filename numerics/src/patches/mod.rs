@@ -175,7 +175,7 @@ mod tests {
             let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
             let patches = Patches::of(cloud.clone(), sampling, &Unobserved).unwrap();
             assert_eq!(patches.count > 0, has_answers, "d = {dimension}");
-            let found = patches.at(&cloud, true, true, &Unobserved).unwrap();
+            let found = patches.at(&cloud, &|_| true, true, &Unobserved).unwrap();
             assert_eq!(found.is_known.contains(&true), has_answers, "d = {dimension}");
         }
     }

@@ -70,7 +70,7 @@ fn worst_on_lattice(n_lines: usize, n_along: usize) -> [f64; 2] {
         (0.5 * (shape[0] + shape[4] + shape[8]).abs() - exact).abs()
     };
     [learned, quadrics].map(|patches| {
-        let found = patches.at(&cloud, true, true, &Unobserved).unwrap();
+        let found = patches.at(&cloud, &|_| true, true, &Unobserved).unwrap();
         found.shapes.chunks_exact(9).zip(&places).map(error).fold(0.0, f64::max)
     })
 }

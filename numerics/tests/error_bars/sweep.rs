@@ -68,7 +68,7 @@ impl Case {
 
 impl Row {
     pub fn take(&mut self, patches: &Patches, cloud: &Cloud, truths: &[Truth]) {
-        let found = patches.at(cloud, true, true, &Unobserved).unwrap();
+        let found = patches.at(cloud, &|_| true, true, &Unobserved).unwrap();
         let deviations = found.curvatures.as_ref().unwrap();
         // Points that are unknown or bent keep the ratio 0: they count as unsure.
         let mut ratios = vec![0.0; truths.len()];

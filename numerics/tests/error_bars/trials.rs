@@ -12,7 +12,7 @@ use crate::sweep::patches;
 
 fn geometry(cloud: Cloud) -> PatchGeometry {
     let cloud = Arc::new(cloud);
-    patches(&cloud).at(&cloud, true, true, &Unobserved).unwrap()
+    patches(&cloud).at(&cloud, &|_| true, true, &Unobserved).unwrap()
 }
 
 /// Trace of the shape operator over d − 1. The sign depends on the side of the normal.
@@ -144,9 +144,9 @@ fn answers_do_not_depend_on_threads_or_company() {
         #[expect(clippy::disallowed_methods, reason = "a test waits for its own pool")]
         pool.install(|| {
             let patches: Patches = patches(&cloud);
-            let all = patches.at(&cloud, true, true, &Unobserved).unwrap();
+            let all = patches.at(&cloud, &|_| true, true, &Unobserved).unwrap();
             let one = Cloud::new(cloud.point(17).to_vec(), 3).unwrap();
-            (all, patches.at(&one, true, true, &Unobserved).unwrap())
+            (all, patches.at(&one, &|_| true, true, &Unobserved).unwrap())
         })
     };
     let ((one, alone), (three, _)) = (on(1), on(3));

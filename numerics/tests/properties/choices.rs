@@ -3,14 +3,18 @@
 
 use std::sync::Arc;
 
+use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::patches::{PatchGeometry, Patches};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::regression::selection::{Learned, Noise, Observed, learn};
 use gramian_numerics::regression::solver::trend::Mean;
+use gramian_numerics::surface::Surface;
+use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
 use gramian_numerics::surface::local::{Given, Learning, LocalSurface};
 
+use crate::common::fits;
 use crate::common::random::Random;
 use crate::support::rotation;
 
@@ -46,7 +50,10 @@ fn moved(cloud: &Cloud) -> Cloud {
 fn regressed(cloud: &Cloud) -> PatchGeometry {
     let cloud = Arc::new(cloud.clone());
     let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
-    Patches::of(cloud.clone(), sampling, &Unobserved).unwrap().at(&cloud, true, true, &Unobserved).unwrap()
+    Patches::of(cloud.clone(), sampling, &Unobserved)
+        .unwrap()
+        .at(&cloud, &|_| true, true, &Unobserved)
+        .unwrap()
 }
 
 #[test]
@@ -108,12 +115,46 @@ fn parts_with_the_hyperparameters_of_the_whole_have_its_surface() {
     assert_eq!(of_part.hyperparameters(), known);
     let queries = above(0.7);
     let at_queries =
-        |surface: &LocalSurface| surface.patches().at(&queries, true, true, &Unobserved).unwrap();
+        |surface: &LocalSurface| surface.patches().at(&queries, &|_| true, true, &Unobserved).unwrap();
     let (a, b) = (at_queries(&of_whole), at_queries(&of_part));
     // Normals have either sign. Neighbours are the same, so what differs is the order of sums.
     let is_close = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(x, y)| (x.abs() - y.abs()).abs() < 1e-9);
     assert!(is_close(&a.normals, &b.normals) && is_close(&a.normal_deviations, &b.normal_deviations));
     assert!(is_close(&a.shapes, &b.shapes));
+}
+
+#[test]
+fn queries_that_are_points_have_the_deviations_of_points() {
+    let dense = {
+        let cloud = noisy(400, 3);
+        let (kernel, alpha) = fits::default_kernel_and_alpha(&cloud, Purpose::Curvatures);
+        fits::surface(&fits::factorize(&cloud, kernel, alpha))
+    };
+    let local = {
+        let cloud = Arc::new(noisy(3000, 3));
+        let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
+        let given = Given { normals: None, learning: None };
+        Surface::Local(Box::new(LocalSurface::of(cloud, sampling, given, &Unobserved).unwrap()))
+    };
+    let request = GeometryRequest { has_deviations: true, ..GeometryRequest::CURVATURES };
+    for surface in [dense, local] {
+        let cloud = surface.cloud().clone();
+        let at = |queries: &Cloud| Geometry::of(&surface, queries, &request, &Unobserved).unwrap();
+        // Every third point, and a place beside the last one, so that the queries are no part of the cloud.
+        let mut places: Vec<f64> = cloud.points().step_by(3).flatten().copied().collect();
+        places.extend(cloud.point(1).iter().map(|x| 1.0001 * x));
+        let queries = Cloud::new(places, 3).unwrap();
+        let (all, some) = (at(&cloud), at(&queries));
+        let (all, some) = (all.deviations().unwrap(), some.deviations().unwrap());
+        for query in 0..queries.n_points() - 1 {
+            for (of_points, of_queries) in [(&all.normal, &some.normal), (&all.mean, &some.mean)] {
+                let (a, b) = (of_points[3 * query], of_queries[query]);
+                assert!((a - b).abs() <= 1e-9 * a.abs(), "{query}: {a} as a point, {b} as a query");
+            }
+        }
+        let last = queries.n_points() - 1;
+        assert!(some.mean[last] < all.mean[1], "{} beside a point, {} at it", some.mean[last], all.mean[1]);
+    }
 }
 
 fn learned(cloud: &Cloud, values: &[f64]) -> Learned {

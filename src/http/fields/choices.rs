@@ -110,6 +110,10 @@ pub enum ValuesInclude {
 }
 
 /// Optional parts of a geometric answer.
+///
+/// `deviations` are standard deviations. A point of the cloud is off the surface by its noise, which moved it
+/// along the surface as well. Deviations at a query that is a point, and those without queries, count that
+/// too. Any other query is a place that is known exactly.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum GeometryInclude {

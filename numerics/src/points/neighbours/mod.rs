@@ -7,6 +7,8 @@ mod search;
 mod tests;
 mod walk;
 
+use rayon::prelude::*;
+
 use super::cloud::Cloud;
 use crate::error::Result;
 use crate::machine::heap::vec_bytes;
@@ -123,6 +125,15 @@ impl Neighbours {
         } else {
             self.name_all_points(found, count);
         }
+    }
+
+    /// Returns which of some places are positions of the cloud, `[m]`.
+    pub(crate) fn hold(&self, places: &Cloud) -> Vec<bool> {
+        let is_held = |found: &mut Vec<Neighbour>, place: usize| {
+            self.nearest_positions_into(places.point(place), 1, found);
+            found.first().is_some_and(|nearest| nearest.squared_distance <= 0.0)
+        };
+        (0..places.n_points()).into_par_iter().map_init(Vec::new, is_held).collect()
     }
 
     /// Returns the `count` nearest positions, each as its first point, nearest first. Repeated observations

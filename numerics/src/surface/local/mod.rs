@@ -130,7 +130,7 @@ impl LocalSurface {
                 (Patches::with(&known.regression, own, near, observer)?, Some(known))
             }
         };
-        let mut at_points = patches.at(&ordered.cloud, true, true, observer)?;
+        let mut at_points = patches.at(&ordered.cloud, &|_| true, true, observer)?;
         let d = cloud.dimension();
         let directions = match given.normals {
             Some(normals) => ordered.own_rows(normals.coordinates(), d),
@@ -273,7 +273,8 @@ impl LocalSurface {
         let (geometry, of_sides) = match are_points {
             true => (self.at_points.given(&self.ordered), self.doubts_of_points()),
             false => {
-                let mut geometry = self.patches.at(queries, false, true, observer)?;
+                let are_points = self.ordered().sampling.neighbours().hold(queries);
+                let mut geometry = self.patches.at(queries, &|query| are_points[query], true, observer)?;
                 self.turn_outward(queries, &mut geometry);
                 (geometry, self.doubts_of_sides(queries))
             }

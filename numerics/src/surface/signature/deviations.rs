@@ -24,8 +24,8 @@ pub(super) fn deviations(
 ) -> Result<Deviations> {
     let (m, d) = (queries.n_points(), queries.dimension());
     let k = d - 1;
-    let are_points = queries == surface.cloud();
-    let mut local = surface.patches(observer)?.at(queries, are_points, true, observer)?;
+    let are_points = surface.sampling.neighbours().hold(queries);
+    let mut local = surface.patches(observer)?.at(queries, &|query| are_points[query], true, observer)?;
     let mut found = Deviations {
         is_known: vec![false; m],
         height: vec![0.0; m],

@@ -49,8 +49,9 @@ pub(super) fn uncertain<'a>(
     if doubtful.is_empty() || surface.cloud().n_points() < 4 * n_quadric_neighbours(d) {
         return Ok(Vec::new());
     }
-    let are_points = queries == surface.cloud();
-    let local = surface.patches(observer)?.at(&queries.select(doubtful), are_points, false, observer)?;
+    let queries = queries.select(doubtful);
+    let are_points = surface.sampling.neighbours().hold(&queries);
+    let local = surface.patches(observer)?.at(&queries, &|query| are_points[query], false, observer)?;
     let is_uncertain = |at: usize, query: usize| {
         let gradient = served.gradient(query);
         if !local.is_known[at] {
