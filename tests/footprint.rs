@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gramian::store::clouds::CloudStore;
-use gramian::store::key::{CloudId, FitKey, ValuesKey};
+use gramian::store::key::{CloudId, FitKey, Merging, ValuesKey};
 use gramian::store::prepared::{PreparedBytes, PreparedFit, PreparedStore};
 use gramian_host::memory::Owner;
 use gramian_host::memory::budget::Budget;
@@ -166,7 +166,7 @@ fn kernel(k: usize) -> Kernel {
 
 fn key(cloud: &Cloud, kernel: &Kernel, alpha: &Regularization) -> FitKey {
     let recipe = Recipe::of_values(SolverKind::Dense, kernel.clone(), alpha.clone());
-    FitKey::of(OWNER, CloudId::of(cloud, None), &recipe, false)
+    FitKey::of(OWNER, CloudId::of(cloud, None), &recipe, Merging::Nothing)
 }
 
 fn resident_bytes() -> f64 {

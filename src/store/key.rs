@@ -9,6 +9,7 @@ use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::model::Recipe;
 use gramian_numerics::patches::PatchKernel;
 use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::points::duplicates::RowCopy;
 use gramian_numerics::regression::solver::trend::Mean;
 use gramian_numerics::regression::sums::regularization::Regularization;
 use gramian_numerics::surface::local::{Learning, SurfaceHyperparameters};
@@ -66,14 +67,24 @@ pub struct FitKey {
     tolerance: Option<u64>,
 }
 
+/// Points that are merged before a fit.
+#[derive(Clone, Copy)]
+pub enum Merging<'a> {
+    Nothing,
+    /// All that coincide.
+    Duplicates,
+    /// Rows that repeat earlier ones.
+    Copies(&'a [RowCopy]),
+}
+
 impl FitKey {
     /// Returns the key without owner and cloud, as 64 hexadecimal digits.
     pub fn fit_name(&self) -> String {
         blake3::Hash::from(self.fit).to_string()
     }
 
-    /// Computes the key of the model that a recipe makes of a cloud, with duplicates merged or not.
-    pub fn of(owner: Owner, cloud_id: CloudId, recipe: &Recipe, is_merged: bool) -> Self {
+    /// Computes the key of the model that a recipe makes of a cloud, with points merged or not.
+    pub fn of(owner: Owner, cloud_id: CloudId, recipe: &Recipe, merging: Merging<'_>) -> Self {
         let mut hasher = blake3::Hasher::new();
         match recipe.solver() {
             SolverKind::Dense => {}
@@ -88,7 +99,7 @@ impl FitKey {
             }
         }
         if let Some((kernel, regularization)) = recipe.process() {
-            hasher.update(&[u8::from(is_merged)]);
+            update_with_merging(&mut hasher, merging);
             update_with_kernel(&mut hasher, kernel);
             update_with_regularization(&mut hasher, regularization);
         }
@@ -104,6 +115,24 @@ impl FitKey {
     /// Returns whether both are of one system, which is iterated to one tolerance or another.
     pub fn is_iterated_like(&self, other: &Self) -> bool {
         self.tolerance.is_some() && Self { tolerance: other.tolerance, ..*self } == *other
+    }
+}
+
+fn update_with_merging(hasher: &mut blake3::Hasher, merging: Merging<'_>) {
+    match merging {
+        Merging::Nothing => {
+            hasher.update(&[0]);
+        }
+        Merging::Duplicates => {
+            hasher.update(&[1]);
+        }
+        Merging::Copies(copies) => {
+            hasher.update(&[2]);
+            let numbers = copies.iter().flat_map(|copy| [copy.row, copy.of]);
+            [2 * copies.len()].into_iter().chain(numbers).for_each(|number| {
+                hasher.update(&(number as u64).to_le_bytes());
+            });
+        }
     }
 }
 
@@ -238,25 +267,27 @@ mod tests {
         let recipe = |solver, kernel: &Kernel, regularization: &Regularization| {
             Recipe::of_values(solver, kernel.clone(), regularization.clone())
         };
-        let of = |owner, kernel: &Kernel, regularization: &Regularization, is_merged| {
+        let of = |owner, kernel: &Kernel, regularization: &Regularization, merging| {
             let recipe = recipe(SolverKind::Dense, kernel, regularization);
-            FitKey::of(Owner(owner), id, &recipe, is_merged)
+            FitKey::of(Owner(owner), id, &recipe, merging)
         };
-        let of_local = |recipe| FitKey::of(Owner(0), id, &recipe, false);
+        let of_local = |recipe| FitKey::of(Owner(0), id, &recipe, Merging::Nothing);
         let gauss = kernel(Family::Gauss, 1.0, 1.0);
         let keys = [
-            of(0, &gauss, &alpha(0.0), false),
-            of(1, &gauss, &alpha(0.0), false),
-            of(0, &gauss, &alpha(0.0), true),
-            of(0, &gauss, &alpha(1e-3), false),
-            of(0, &gauss, &Regularization::PerPoint(vec![0.0, 0.0]), false),
-            of(0, &kernel(Family::Gauss, 2.0, 1.0), &alpha(0.0), false),
-            of(0, &kernel(Family::Gauss, 1.0, 2.0), &alpha(0.0), false),
-            of(0, &Kernel::of_axes(Family::Gauss, &[1.0], 1.0).unwrap(), &alpha(0.0), false),
-            of(0, &Kernel::of_axes(Family::Gauss, &[1.0, 2.0], 1.0).unwrap(), &alpha(0.0), false),
-            of(0, &kernel(Family::InverseMultiquadric, 1.0, 1.0), &alpha(0.0), false),
-            of(0, &kernel(Family::Laplace { epsilon: 0.0 }, 1.0, 1.0), &alpha(0.0), false),
-            of(0, &kernel(Family::Laplace { epsilon: 1.0 }, 1.0, 1.0), &alpha(0.0), false),
+            of(0, &gauss, &alpha(0.0), Merging::Nothing),
+            of(1, &gauss, &alpha(0.0), Merging::Nothing),
+            of(0, &gauss, &alpha(0.0), Merging::Duplicates),
+            of(0, &gauss, &alpha(0.0), Merging::Copies(&[RowCopy { row: 1, of: 0 }])),
+            of(0, &gauss, &alpha(0.0), Merging::Copies(&[RowCopy { row: 2, of: 0 }])),
+            of(0, &gauss, &alpha(1e-3), Merging::Nothing),
+            of(0, &gauss, &Regularization::PerPoint(vec![0.0, 0.0]), Merging::Nothing),
+            of(0, &kernel(Family::Gauss, 2.0, 1.0), &alpha(0.0), Merging::Nothing),
+            of(0, &kernel(Family::Gauss, 1.0, 2.0), &alpha(0.0), Merging::Nothing),
+            of(0, &Kernel::of_axes(Family::Gauss, &[1.0], 1.0).unwrap(), &alpha(0.0), Merging::Nothing),
+            of(0, &Kernel::of_axes(Family::Gauss, &[1.0, 2.0], 1.0).unwrap(), &alpha(0.0), Merging::Nothing),
+            of(0, &kernel(Family::InverseMultiquadric, 1.0, 1.0), &alpha(0.0), Merging::Nothing),
+            of(0, &kernel(Family::Laplace { epsilon: 0.0 }, 1.0, 1.0), &alpha(0.0), Merging::Nothing),
+            of(0, &kernel(Family::Laplace { epsilon: 1.0 }, 1.0, 1.0), &alpha(0.0), Merging::Nothing),
             of_local(recipe(SolverKind::Local, &gauss, &alpha(0.0))),
             of_local(recipe(SolverKind::Landmark, &gauss, &alpha(0.0))),
             of_local(recipe(SolverKind::Iterative, &gauss, &alpha(0.0))),

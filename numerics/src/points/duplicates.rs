@@ -91,7 +91,31 @@ pub struct Merge {
     first_points: Vec<usize>,
 }
 
+/// A row that repeats an earlier one: its position, and whatever belongs to it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RowCopy {
+    pub row: usize,
+    /// The earlier row, which repeats no other.
+    pub of: usize,
+}
+
 impl Merge {
+    /// Returns the cloud without copies, which ascend, and its map.
+    pub fn copies(cloud: &Cloud, copies: &[RowCopy]) -> (Cloud, Self) {
+        let mut original: Vec<usize> = (0..cloud.n_points()).collect();
+        copies.iter().for_each(|copy| original[copy.row] = copy.of);
+        let first_points: Vec<usize> =
+            original.iter().enumerate().filter(|(row, of)| row == *of).map(|(row, _)| row).collect();
+        let mut group_of = vec![0; cloud.n_points()];
+        first_points.iter().enumerate().for_each(|(group, &row)| group_of[row] = group);
+        let mut group_sizes = vec![1; first_points.len()];
+        for copy in copies {
+            group_of[copy.row] = group_of[copy.of];
+            group_sizes[group_of[copy.of]] += 1;
+        }
+        (cloud.select(&first_points), Self { group_of, group_sizes, first_points })
+    }
+
     /// Returns the cloud of distinct positions, in the order of their first occurrence, and its map. Returns
     /// `None` if there is nothing to merge.
     ///

@@ -9,12 +9,14 @@ mod sampling;
 #[path = "../error_bars/shapes.rs"]
 mod shapes;
 
+mod copies;
 mod features;
 mod fields;
 mod flags;
 mod posterior;
 mod sweep;
 
+use copies::Repeated;
 use features::{Bands, Feature, Measured};
 use fields::{FIELDS, Field};
 use flags::{Asked, Counts, Values};
@@ -78,6 +80,24 @@ fn sensors_have_posteriors_whose_bands_cover() {
     assert!(short.iter().all(|(_, coverage)| *coverage > 70.0), "{short:?}");
     let all = rows.iter().map(|(_, coverage)| coverage).sum::<f64>() / rows.len() as f64;
     assert!((94.0..99.5).contains(&all), "{all}");
+}
+
+#[test]
+fn rows_that_repeat_change_neither_errors_nor_bars() {
+    for (n_points, noise) in [(500, 0.3), (200, 0.1)] {
+        let plain = Repeated { n_points, noise, n_copies: 0, n_differing: 0 };
+        let repeats = [(0, 3), (0, 20), (10, 0), (10, 1), (50, 0), (50, 3), (200, 0), (200, 20)];
+        let case = |(n_copies, n_differing)| Repeated { n_copies, n_differing, ..plain };
+        let cases: Vec<Repeated> = std::iter::once((0, 0)).chain(repeats).map(case).collect();
+        let found: Vec<_> = cases.par_iter().map(|case| (case, case.found(10))).collect();
+        let without = found[0].1.error;
+        for (case, found) in found {
+            // Copies were taken for measurements without noise: errors of three times as much, or bars of
+            // thousands of times their length.
+            assert!((88.0..=99.5).contains(&found.coverage), "{case:?}: {found:?}");
+            assert!(found.error <= 1.1 * without, "{case:?}: {found:?}, without copies {without}");
+        }
+    }
 }
 
 #[test]

@@ -7,12 +7,13 @@ use std::sync::Arc;
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::points::duplicates::{Merge, RowCopy};
 use gramian_numerics::points::sampling::Sampling as Spacings;
 use gramian_numerics::regression::function::interpolant::Interpolant;
 use gramian_numerics::regression::function::posterior::variances_with_mean;
 use gramian_numerics::regression::selection::{
-    Criterion, Hyperparameters, MAX_EVALUATIONS, Noise, Observations, Observed, Parameter, Selection,
-    Variation, learn, select,
+    Criterion, Hyperparameters, Learned, MAX_EVALUATIONS, Noise, Observations, Observed, Parameter,
+    Selection, Variation, learn, select,
 };
 use gramian_numerics::regression::solver::trend::Mean;
 use gramian_numerics::regression::solver::{Solver, System};
@@ -111,7 +112,9 @@ pub struct Posterior {
 }
 
 pub fn posterior(by: By, cloud: Arc<Cloud>, values: &[f64], at: &Cloud) -> Posterior {
-    let Chosen { kernel, ratio, variance, has_place } = chosen(by, &cloud, values);
+    let Chosen { kernel, ratio, variance, has_place, copies } = chosen(by, &cloud, values);
+    let (without, merge) = Merge::copies(&cloud, &copies);
+    let (cloud, values) = (Arc::new(without), &merge.mean(values)[..]);
     let alpha = Regularization::uniform(ratio).unwrap();
     let solver = System::new(cloud, kernel, alpha).and_then(|system| Solver::dense(system, &Unobserved));
     let u = Interpolant::fit_with_mean(Arc::new(solver.unwrap()), values, Mean::Constant, &Unobserved);
@@ -131,6 +134,7 @@ struct Chosen {
     variance: f64,
     /// Whether the values contradict the kernel at some place.
     has_place: bool,
+    copies: Vec<RowCopy>,
 }
 
 fn chosen(by: By, cloud: &Cloud, values: &[f64]) -> Chosen {
@@ -140,7 +144,8 @@ fn chosen(by: By, cloud: &Cloud, values: &[f64]) -> Chosen {
     let By::Criterion(criterion) = by else {
         let kernel = Kernel::new(learned.family, learned.length_scale, 1.0).unwrap();
         let has_place = learned.disagreement.is_some_and(|found| found.place.is_some());
-        return Chosen { kernel, ratio: learned.ratio, variance: learned.variance, has_place };
+        let Learned { ratio, variance, copies, .. } = learned;
+        return Chosen { kernel, ratio, variance, has_place, copies };
     };
     let kernel = Kernel::new(learned.family, learned.length_scale, learned.variance).unwrap();
     let start = Hyperparameters::of(&kernel, Regularization::Uniform(learned.ratio * learned.variance));
@@ -166,5 +171,5 @@ fn chosen(by: By, cloud: &Cloud, values: &[f64]) -> Chosen {
     let kernel = Kernel::new(found.family, found.length_scales[0], 1.0).unwrap();
     // The least noise with which many points can be factorized.
     let ratio = (noise / found.variance).max(1e-10);
-    Chosen { kernel, ratio, variance: found.variance, has_place: false }
+    Chosen { kernel, ratio, variance: found.variance, has_place: false, copies: Vec::new() }
 }

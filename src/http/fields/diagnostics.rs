@@ -97,6 +97,8 @@ pub enum WarningCode {
     /// Values contradict kernel and noise, so deviations are too short. If the warning names a value, perhaps
     /// only around it.
     Misfit,
+    /// Rows repeat points and values of an earlier one. They count once when kernel and noise are learned.
+    RepeatedRows,
 }
 
 /// Something that was changed, or that limits the accuracy of the answer.

@@ -2,6 +2,7 @@ use futures_util::future::BoxFuture;
 use tokio::sync::oneshot;
 
 use super::*;
+use crate::store::key::Merging;
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::model::Recipe;
@@ -22,7 +23,7 @@ fn key(alpha: f64) -> FitKey {
     let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
     let id = CloudId::of(&cloud, None);
     let recipe = Recipe::of_values(SolverKind::Dense, kernel, Regularization::Uniform(alpha));
-    FitKey::of(Owner(0), id, &recipe, false)
+    FitKey::of(Owner(0), id, &recipe, Merging::Nothing)
 }
 
 async fn factorize(n: usize, memory: Reservation) -> Result<PreparedFit, &'static str> {

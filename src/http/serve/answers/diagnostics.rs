@@ -99,9 +99,19 @@ impl FitModel {
             let residual = report.relative_residual.unwrap_or_default();
             warn(WarningCode::Refined, format!("refined to a relative residual of {residual:.1e}"));
         }
-        if let Some(merge) = &plan.merge {
-            let detail = format!("points merged into an earlier one: {}", merge.n_merged());
-            warn(WarningCode::DuplicatesMerged, detail);
+        match (&plan.merge, plan.process.n_copies()) {
+            (None, _) => {}
+            (Some(merge), 0) => {
+                let detail = format!("points merged into an earlier one: {}", merge.n_merged());
+                warn(WarningCode::DuplicatesMerged, detail);
+            }
+            (Some(_), n_copies) => {
+                let detail = format!(
+                    "rows that repeat point and values of an earlier one: {n_copies}; with the noise left to the values they count once; \
+                     give alpha if they were measured"
+                );
+                warn(WarningCode::RepeatedRows, detail);
+            }
         }
         if plan.has_least_variance() {
             warn(WarningCode::VarianceClamped, TOO_SMALL.to_owned());

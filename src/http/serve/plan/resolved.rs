@@ -8,7 +8,7 @@ use crate::http::fields::DuplicatePolicy;
 use crate::http::problem::{Pointers, Problem, from_numerics};
 use crate::http::state::app::FitFailure;
 use crate::store::clouds::RegisteredCloud;
-use crate::store::key::FitKey;
+use crate::store::key::{FitKey, Merging};
 use gramian_numerics::error::{NotDefinite, NumericsError};
 use gramian_numerics::model::Recipe;
 use gramian_numerics::model::choose::AutoReason;
@@ -16,7 +16,7 @@ use gramian_numerics::model::price::CloudSize;
 use gramian_numerics::model::price::MakingPrice;
 use gramian_numerics::observer::Observer;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::points::duplicates::Merge;
+use gramian_numerics::points::duplicates::{Merge, RowCopy};
 use gramian_numerics::regression::selection::Learned;
 use gramian_numerics::regression::solver::Disagreement;
 use gramian_numerics::regression::solver::trend::{Mean, Trend};
@@ -55,11 +55,32 @@ pub struct Process {
     /// Kernel, noise and mean learned from the values. If kernel and noise are given, only the mean was
     /// learned.
     pub(super) learned: Option<Arc<Learned>>,
+    /// Whether the noise was learned too.
+    pub(super) has_learned_noise: bool,
+}
+
+impl Process {
+    /// The rows that count once with the rows that they repeat, because noise was learned from the values.
+    fn copies(&self) -> &[RowCopy] {
+        self.learned.as_ref().filter(|_| self.has_learned_noise).map_or(&[], |learned| &learned.copies)
+    }
+
+    /// Number of rows that count once with the rows that they repeat.
+    pub fn n_copies(&self) -> usize {
+        self.copies().len()
+    }
 }
 
 impl Default for Process {
     fn default() -> Self {
-        Self { scale: 1.0, is_learned: false, mean: Mean::Zero, values: None, learned: None }
+        Self {
+            scale: 1.0,
+            is_learned: false,
+            mean: Mean::Zero,
+            values: None,
+            learned: None,
+            has_learned_noise: false,
+        }
     }
 }
 
@@ -84,9 +105,18 @@ impl FitPlan {
         };
         let merges = duplicates == DuplicatePolicy::Merge && is_singular_at_duplicates;
         let refused = |error| from_numerics(error, pointers);
-        let merged =
-            if merges { Merge::duplicates_of(&stored.cloud, observer).map_err(refused)? } else { None };
-        let key = FitKey::of(owner, stored.id, &recipe, merged.is_some());
+        let merged = if merges {
+            Merge::duplicates_of(&stored.cloud, observer).map_err(refused)?
+        } else {
+            let copies = process.copies();
+            (!copies.is_empty()).then(|| Merge::copies(&stored.cloud, copies))
+        };
+        let merging = match (&merged, merges) {
+            (None, _) => Merging::Nothing,
+            (Some(_), true) => Merging::Duplicates,
+            (Some(_), false) => Merging::Copies(process.copies()),
+        };
+        let key = FitKey::of(owner, stored.id, &recipe, merging);
         let (fitted, merge) = match merged {
             None => (stored.cloud.clone(), None),
             Some((cloud, merge)) => (Arc::new(cloud), Some(Arc::new(merge))),

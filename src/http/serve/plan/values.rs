@@ -115,6 +115,7 @@ impl PlannedValues {
         let Self { on, solver, reason, mean, values, learned, .. } = self;
         let refuse = |error| from_numerics(error, on.pointers);
         let is_learned = self.kernel.is_none() && learned.is_some();
+        let has_learned_noise = is_learned && self.regularization.is_none();
         let scaled = match (&self.kernel, &learned) {
             (Some(kernel), _) => {
                 let kernel = kernel.resolve(on.stored.scales(), Purpose::Values, on.pointers)?;
@@ -128,7 +129,7 @@ impl PlannedValues {
         };
         let ScaledProcess { kernel, regularization, scale } = scaled;
         let recipe = Recipe::of_values(solver, kernel, regularization);
-        let process = Process { scale, is_learned, mean, values, learned };
+        let process = Process { scale, is_learned, mean, values, learned, has_learned_noise };
         let recipe = ChosenRecipe { recipe, reason };
         FitPlan::of(on, recipe, process, observer)
     }

@@ -170,8 +170,8 @@ impl<'de> Deserializer<'de> for Value<'_, 'de> {
     }
 
     /// Shows the numbers of a row in one piece, as the bytes of f64, and any other list entry by entry. The
-    /// numbers are read by code that does not depend on the visitor and so is compiled here, not with the types
-    /// of the service.
+    /// numbers are read by code that does not depend on the visitor and so is compiled here, not with the
+    /// types of the service.
     #[inline(always)]
     fn deserialize_bytes<V: Visitor<'de>>(mut self, visitor: V) -> Result<V::Value, Error> {
         if !self.opens_list() {

@@ -1,7 +1,7 @@
 //! A grid of kernels and noises: smoothness, length scale, and the ratio of noise to variance.
 
 use super::values::Values;
-use super::{Learned, Noise};
+use super::{LEAST_RATIO, Learned, Noise};
 use crate::error::{NumericsError, Result};
 use crate::kernel::{Family, Kernel};
 
@@ -35,8 +35,7 @@ const ROUGH_LENGTH: usize = 2;
 /// single outliers.
 const LEAST_LOCAL: usize = 5;
 
-/// Least ratio of noise to variance. The others follow in quarters of a decade, up to 10.
-const LEAST_RATIO: f64 = 1e-10;
+/// Ratios of noise to variance follow [`LEAST_RATIO`] in quarters of a decade, up to 10.
 const RATIOS_PER_DECADE: usize = 4;
 const N_RATIOS: usize = 11 * RATIOS_PER_DECADE + 1;
 
@@ -129,6 +128,7 @@ impl Grid {
             length_scale: family.length_scale_of_values(observed.sampling.scales()),
             ratio: if self.is_exact() { 0.0 } else { ratio },
             variance: self.known_variance(ratio).unwrap_or(by_values),
+            copies: Vec::new(),
             trend: None,
             disagreement: None,
         }
@@ -150,6 +150,7 @@ impl Grid {
             length_scale: self.length_scale(cell.length),
             ratio: if self.is_exact() { 0.0 } else { ratio },
             variance,
+            copies: Vec::new(),
             trend: None,
             disagreement: None,
         })

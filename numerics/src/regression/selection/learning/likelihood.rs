@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::Learned;
 use super::group::{Group, Nugget, Whitened};
 use super::order::{Conditional, PLACE};
+use super::replicates::Scatter;
 use super::values::Values;
 use crate::error::{NumericsError, Result};
 use crate::kernel::Kernel;
@@ -68,6 +69,8 @@ pub(super) struct Evidence<'a> {
     groups: Vec<Group>,
     /// Points whose values are explained, group after group.
     points: Vec<usize>,
+    /// Scatter of the rows at these points.
+    scatter: Scatter,
 }
 
 /// Functions and values without what the groups explain of them.
@@ -81,8 +84,11 @@ struct Unexplained {
 impl<'a> Evidence<'a> {
     pub(super) fn of(values: &'a Values<'a>, conditionals: &[Conditional]) -> Self {
         let groups = conditionals.par_iter().map(|group| Group::of(values, group)).collect();
-        let points = conditionals.iter().flat_map(|group| &group.points[group.n_given..]).copied().collect();
-        Self { values, groups, points }
+        let points: Vec<usize> =
+            conditionals.iter().flat_map(|group| &group.points[group.n_given..]).copied().collect();
+        let scatter =
+            points.iter().filter_map(|&point| values.replicate(point)).map(|rows| rows.scatter).sum();
+        Self { values, groups, points, scatter }
     }
 
     /// Returns the score of a kernel of variance 1 with this ratio of noise. The variance of the process is
@@ -92,6 +98,9 @@ impl<'a> Evidence<'a> {
     /// `negative_log` is `½|z|²/s² + ½(n − p) ln s² + ½ ln det K + ½ ln det FᵀK⁻¹F` (Rasmussen and Williams
     /// 2006, eq. 2.45; Patterson and Thompson 1971). It is summed over the lists of values, each with a mean
     /// of its own. With more than one group, `L⁻¹` is that of Vecchia's approximation (order.rs).
+    ///
+    /// Several rows at a position are their mean. Then r rows add to |z|² the squares of their scatter over
+    /// the ratio, to n r − 1, and to `ln det K` `(r − 1) ln ratio`.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -106,11 +115,14 @@ impl<'a> Evidence<'a> {
         let Some(mut left) = self.unexplained(kernel, nugget, observer)? else { return Ok(None) };
         let (n, p, n_lists) = (left.n_rows, self.n_functions(), self.values.n_lists());
         let Some(of_mean) = remove_mean(&mut left.columns, n, p) else { return Ok(None) };
-        let energy = dot(&left.columns[p * n..], &left.columns[p * n..]);
-        let degrees = (n_lists * n.saturating_sub(p)) as f64;
+        let of_scatter = self.scatter.squares / ratio;
+        let energy = dot(&left.columns[p * n..], &left.columns[p * n..]) + of_scatter;
+        let n_scattered = self.scatter.n_degrees;
+        let degrees = (n_lists * n.saturating_sub(p) + n_scattered) as f64;
         let likeliest = || (energy / degrees).max(self.values.mean_square / (1.0 + ratio));
         let variance = variance.unwrap_or_else(likeliest);
-        let of_determinants = n_lists as f64 * (left.log_determinant + of_mean);
+        let of_determinants =
+            n_lists as f64 * (left.log_determinant + of_mean) + n_scattered as f64 * ratio.ln();
         let negative_log = 0.5 * (energy / variance + degrees * variance.ln() + of_determinants);
         let of_places = self.variance_of_places(&left.columns[p * n..]);
         Ok(negative_log.is_finite().then_some(Score { negative_log, variance, of_places }))

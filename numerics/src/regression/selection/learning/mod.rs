@@ -17,13 +17,16 @@ mod group;
 mod likelihood;
 mod order;
 mod price;
+mod replicates;
 mod search;
 mod values;
 
 use crate::error::Result;
 use crate::kernel::{Family, Kernel};
+use crate::machine::heap::vec_bytes;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
+use crate::points::duplicates::RowCopy;
 use crate::points::sampling::Sampling;
 use crate::regression::solver::Disagreement;
 use crate::regression::solver::trend::{Mean, Trend};
@@ -36,6 +39,9 @@ use values::Values;
 
 pub(super) use likelihood::remove_mean;
 pub use price::learning_price;
+
+/// Least ratio of noise to variance that is told from none.
+const LEAST_RATIO: f64 = 1e-10;
 
 /// Prior knowledge of the noise of values.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -85,6 +91,9 @@ pub struct Learned {
     pub ratio: f64,
     /// Variance of the process, unit V². If the noise is known, exactly the variance that gives the ratio.
     pub variance: f64,
+    /// The rows that repeat position and values of an earlier one, ascending. Nothing was learned from them,
+    /// and a fit is better without them ([`crate::points::duplicates::Merge::copies`]).
+    pub copies: Vec<RowCopy>,
     /// Mean found by all groups, for solvers that never see all values at once.
     pub trend: Option<Trend>,
     /// Disagreement of the groups with kernel and noise, for the same solvers.
@@ -99,7 +108,7 @@ impl Learned {
 
     /// Bytes held on the heap.
     pub fn n_bytes(&self) -> usize {
-        self.trend.as_ref().map_or(0, Trend::n_bytes)
+        self.trend.as_ref().map_or(0, Trend::n_bytes) + vec_bytes(&self.copies)
     }
 }
 
@@ -136,14 +145,15 @@ pub fn learn(observed: Observed<'_>, observer: &dyn Observer) -> Result<Learned>
     let values = Values::of(observed);
     let order = Order::of(&observed, observer)?;
     let all = Evidence::of(&values, &order.searched);
-    let decided = if observed.cloud.n_points() < LEAST_VALUES || values.is_constant() {
+    let n_positions = observed.sampling.neighbours().n_positions();
+    let decided = if n_positions < LEAST_VALUES || values.is_constant() {
         None
     } else {
         search(&all, &order, observer)?
     };
     let learned = decided.unwrap_or_else(|| Grid::of(&values).undecided(&values));
     let kernel = Kernel::new(learned.family, learned.length_scale, 1.0)?;
-    all.concluded(&kernel, learned, observer)
+    all.concluded(&kernel, Learned { copies: values.copies(), ..learned }, observer)
 }
 
 /// Searches the grid on all values, or on a sample and from there on all values in groups.
@@ -188,6 +198,7 @@ pub fn learn_mean(observed: Observed<'_>, kernel: &Kernel, observer: &dyn Observ
         length_scale: kernel.length_scale(),
         ratio,
         variance,
+        copies: Vec::new(),
         trend: None,
         disagreement: None,
     };

@@ -60,7 +60,7 @@ impl Conditional {
     }
 }
 
-/// The points of a cloud in groups.
+/// The positions of a cloud in groups, each by its first point.
 pub(super) struct Order {
     /// Groups by which hyperparameters are searched.
     pub(super) searched: Vec<Conditional>,
@@ -74,8 +74,8 @@ impl Order {
     /// # Errors
     /// `NumericsError::Cancelled`.
     pub(super) fn of(observed: &Observed<'_>, observer: &dyn Observer) -> Result<Self> {
-        let (cloud, n) = (observed.cloud, observed.cloud.n_points());
-        if n <= MAX_TOGETHER {
+        let cloud = observed.cloud;
+        if observed.sampling.neighbours().n_positions() <= MAX_TOGETHER {
             let halves = halves(observed, &[]);
             let all = Conditional::whole(halves.iter().flat_map(|half| by_places(cloud, half)).collect());
             return Ok(Self { searched: vec![all], deep: Vec::new() });
@@ -113,7 +113,8 @@ fn sample(observed: &Observed<'_>, observer: &dyn Observer) -> Result<Vec<usize>
     let cloud = observed.cloud;
     let centres = thinned_points(cloud, MAX_SAMPLE / TOGETHER, observer)?;
     let around = |&point: &usize| {
-        observed.sampling.neighbours().nearest(cloud.point(point), TOGETHER).into_iter().map(|n| n.point)
+        let near = observed.sampling.neighbours().nearest_positions(cloud.point(point), TOGETHER);
+        near.into_iter().map(|neighbour| neighbour.point)
     };
     let mut points: Vec<usize> = centres.iter().flat_map(around).collect();
     points.sort_unstable();
@@ -124,10 +125,13 @@ fn sample(observed: &Observed<'_>, observer: &dyn Observer) -> Result<Vec<usize>
 /// Splits the points outside of the sample into two halves, each spread over the cloud. Of every two near
 /// points, each half has one.
 fn halves(observed: &Observed<'_>, sample: &[usize]) -> [Vec<u32>; 2] {
-    let n = observed.cloud.n_points();
-    let mut is_left = vec![true; n];
+    let neighbours = observed.sampling.neighbours();
+    let mut is_left = vec![false; observed.cloud.n_points()];
+    for position in 0..neighbours.n_positions() {
+        is_left[neighbours.points_at(position)[0] as usize] = true;
+    }
     sample.iter().for_each(|&point| is_left[point] = false);
-    let left = (0..n as u32).filter(|&point| is_left[point as usize]).collect();
+    let left = (0..is_left.len() as u32).filter(|&point| is_left[point as usize]).collect();
     let mut halves = [Vec::new(), Vec::new()];
     for cell in Cells::of(observed.cloud, left, 2).iter() {
         let first = lonelier(observed, cell);

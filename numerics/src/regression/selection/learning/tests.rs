@@ -134,3 +134,34 @@ fn points_that_coincide_have_a_mean_though_some_have_no_noise() {
         assert!(learn(observed, &Unobserved).unwrap().trend.is_some(), "{n}");
     }
 }
+
+/// A field with noise of 0.3, some of whose rows are sent twice: `n_copies` as they are, and `n_differing`
+/// with another noise.
+fn field_with_rows_twice(seed: u64, n_copies: usize, n_differing: usize) -> (Cloud, Vec<f64>) {
+    let n = 500;
+    let mut random = Random(seed);
+    let mut coordinates: Vec<f64> = (0..2 * n).map(|_| random.uniform()).collect();
+    let smooth = |x: &[f64]| (5.0 * x[0]).sin() + (4.0 * x[1]).cos() * x[0];
+    let field: Vec<f64> = coordinates.chunks(2).map(smooth).collect();
+    let mut values: Vec<f64> = field.iter().map(|u| u + 0.3 * random.normal()).collect();
+    for copy in 0..n_copies + n_differing {
+        let point = copy * 7 % n;
+        coordinates.extend_from_within(2 * point..2 * point + 2);
+        values.push(if copy < n_copies { values[point] } else { field[point] + 0.3 * random.normal() });
+    }
+    (Cloud::new(coordinates, 2).unwrap(), values)
+}
+
+#[test]
+fn rows_that_repeat_leave_the_noise_as_it_is() {
+    for seed in 1..=10 {
+        for (n_copies, n_differing) in [(0, 0), (10, 0), (50, 0), (200, 0), (0, 3), (50, 1), (200, 20)] {
+            let (cloud, values) = field_with_rows_twice(seed, n_copies, n_differing);
+            let found = learned(&cloud, &values, Noise::Unknown);
+            let deviation = (found.ratio * found.variance).sqrt();
+            // A step of the grid is a third of the deviation, and 500 values know theirs to a thirtieth.
+            assert!((0.2..0.42).contains(&deviation), "{seed} {n_copies} {n_differing}: {deviation}");
+            assert!(found.variance < 20.0, "{seed} {n_copies} {n_differing}: {}", found.variance);
+        }
+    }
+}

@@ -1,6 +1,8 @@
 //! Values on which kernels are compared.
 
+use super::replicates::{Replicate, Replicates, Rows};
 use super::{Noise, Observed};
+use crate::points::duplicates::RowCopy;
 use crate::regression::solver::trend::Basis;
 
 /// Largest number of lists of values that are looked at. With one noise and one kernel for all, more lists
@@ -20,6 +22,7 @@ pub(super) struct Values<'a> {
     pub(super) mean_square: f64,
     /// Mean of the noise variances, unit V². `None` unless they are given per point.
     mean_noise: Option<f64>,
+    replicates: Replicates,
     pub(super) basis: Basis,
 }
 
@@ -42,16 +45,34 @@ impl<'a> Values<'a> {
             Noise::Unknown | Noise::Uniform(_) => None,
         };
         let mean_square = mean_square.max(f64::MIN_POSITIVE);
-        Self { observed, lists, shared, unit: greatest, mean_square, mean_noise, basis }
+        let rows = Rows {
+            lists: &lists,
+            noise: |point| relative_noise(observed.noise, mean_noise, point),
+            unit: greatest,
+            mean_square,
+        };
+        let replicates = Replicates::of(&observed, &rows);
+        Self { observed, lists, shared, unit: greatest, mean_square, mean_noise, replicates, basis }
+    }
+
+    /// The rows that repeat position and values of an earlier one, ascending.
+    pub(super) fn copies(&self) -> Vec<RowCopy> {
+        self.replicates.copies()
+    }
+
+    /// Returns what the rows at the position of its first point say together. `None` where there is one row.
+    pub(super) fn replicate(&self, first: usize) -> Option<&Replicate> {
+        self.replicates.at(first)
     }
 
     pub(super) fn n_lists(&self) -> usize {
         self.lists.len()
     }
 
-    /// Returns the value of a list at a point, in units of the greatest.
-    pub(super) fn at(&self, list: usize, point: usize) -> f64 {
-        let rest = self.lists[list][point] - self.shared[list];
+    /// Returns the value of a list at the position of its first point, in units of the greatest.
+    pub(super) fn at(&self, list: usize, first: usize) -> f64 {
+        let value = self.replicate(first).map_or(self.lists[list][first], |rows| rows.means[list]);
+        let rest = value - self.shared[list];
         if self.unit > 0.0 { rest / self.unit } else { rest }
     }
 
@@ -60,14 +81,16 @@ impl<'a> Values<'a> {
         self.shared[0]
     }
 
-    /// Returns the noise variances at some points in units of their mean. `None` unless they are given per
-    /// point.
-    pub(super) fn relative_noise(&self, points: &[usize]) -> Option<Vec<f64>> {
-        let (Noise::PerPoint(variances), Some(mean)) = (self.observed.noise, self.mean_noise) else {
+    /// Returns the noise variances at the positions of some first points, in units of the mean of all rows.
+    /// `None` if all are 1.
+    pub(super) fn relative_noise(&self, firsts: &[usize]) -> Option<Vec<f64>> {
+        if self.mean_noise.is_none() && self.replicates.is_empty() {
             return None;
-        };
-        let relative = |&point: &usize| if mean > 0.0 { variances[point] / mean } else { 1.0 };
-        Some(points.iter().map(relative).collect())
+        }
+        let of_row = |point: usize| relative_noise(self.observed.noise, self.mean_noise, point);
+        let relative =
+            |&first: &usize| self.replicate(first).map_or_else(|| of_row(first), |rows| rows.noise);
+        Some(firsts.iter().map(relative).collect())
     }
 
     /// Returns whether all values are 0.
@@ -79,5 +102,13 @@ impl<'a> Values<'a> {
     pub(super) fn is_constant(&self) -> bool {
         let is_equal = || self.lists.iter().all(|list| list.iter().all(|&value| value == list[0]));
         self.unit == 0.0 || (self.basis.n_functions() > 0 && is_equal())
+    }
+}
+
+/// Returns the noise variance of a row in units of the mean of all rows.
+fn relative_noise(noise: Noise<'_>, mean: Option<f64>, point: usize) -> f64 {
+    match (noise, mean) {
+        (Noise::PerPoint(variances), Some(mean)) if mean > 0.0 => variances[point] / mean,
+        _ => 1.0,
     }
 }

@@ -16,6 +16,7 @@ class WarningCode(StrEnum):
     PARTS_DROPPED = "parts_dropped"
     RAW_MESH = "raw_mesh"
     REFINED = "refined"
+    REPEATED_ROWS = "repeated_rows"
     VARIANCE_CLAMPED = "variance_clamped"
 
     def __str__(self) -> str:
