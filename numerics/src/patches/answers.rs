@@ -51,6 +51,9 @@ pub struct CurvatureDeviations {
     /// True where the surface turns by a radian or more within the radius of the neighbourhood, `[m]`. A
     /// quadric cannot follow such a turn, and the deviations miss it.
     pub is_bent: Vec<bool>,
+    /// True where the surface surely turns by less than a tenth of a radian within the radius of the
+    /// neighbourhood, `[m]`.
+    pub is_flat: Vec<bool>,
 }
 
 /// Least bend of a bent surface: its largest curvature in units of the radius of the neighbourhood.
@@ -59,9 +62,13 @@ pub struct CurvatureDeviations {
 /// right ones do (docs/error-bars.md).
 const BENT: f64 = 1.0;
 
+/// Greatest bend of a flat surface, with [`SURELY`] deviations of the curvature that is known least.
+const FLAT_BEND: f64 = 0.1;
+const SURELY: f64 = 2.0;
+
 /// Deviation of a normal, in radians, below which its neighbourhood is flat. The stiffer process then gives
 /// the slopes.
-const FLAT: f64 = 0.03;
+const STIFF_BELOW: f64 = 0.03;
 
 impl PatchGeometry {
     fn unknown(m: usize, d: usize, with_deviations: bool) -> Self {
@@ -70,6 +77,7 @@ impl PatchGeometry {
             mean: vec![0.0; m],
             gaussian: vec![0.0; m],
             is_bent: vec![false; m],
+            is_flat: vec![false; m],
         });
         Self {
             is_known: vec![false; m],
@@ -89,10 +97,10 @@ impl PatchGeometry {
         let mut curvatures: Vec<Option<CurvatureSlots<'_>>> = Vec::new();
         if let Some(deviations) = &mut self.curvatures {
             let rest = deviations.mean.chunks_mut(lanes).zip(deviations.gaussian.chunks_mut(lanes));
-            let rest = rest.zip(deviations.is_bent.chunks_mut(lanes));
-            let all = deviations.principal.chunks_mut(lanes * (d - 1)).zip(rest);
-            let slots = |(principal, ((mean, gaussian), is_bent))| {
-                Some(CurvatureSlots { principal, mean, gaussian, is_bent })
+            let bends = deviations.is_bent.chunks_mut(lanes).zip(deviations.is_flat.chunks_mut(lanes));
+            let all = deviations.principal.chunks_mut(lanes * (d - 1)).zip(rest.zip(bends));
+            let slots = |(principal, ((mean, gaussian), (is_bent, is_flat)))| {
+                Some(CurvatureSlots { principal, mean, gaussian, is_bent, is_flat })
             };
             curvatures.extend(all.map(slots));
         }
@@ -136,6 +144,7 @@ struct CurvatureSlots<'a> {
     mean: &'a mut [f64],
     gaussian: &'a mut [f64],
     is_bent: &'a mut [bool],
+    is_flat: &'a mut [bool],
 }
 
 impl Slots<'_> {
@@ -157,6 +166,8 @@ impl Slots<'_> {
             curvatures.mean[lane] = found.mean / place.radius;
             curvatures.gaussian[lane] = found.gaussian / place.radius.powi(k as i32);
             curvatures.is_bent[lane] = found.bend >= BENT;
+            let least_known = found.principal.iter().fold(0.0, |a: f64, &deviation| a.max(deviation));
+            curvatures.is_flat[lane] = found.bend + SURELY * least_known <= FLAT_BEND;
         }
     }
 }
@@ -220,7 +231,7 @@ impl Patches {
         }
         let d = self.support.cloud().dimension();
         let is_flat = |(estimate, &is_point): (&Option<Estimate>, &bool)| {
-            estimate.as_ref().is_some_and(|estimate| estimate.normal_deviation(d, is_point) < FLAT)
+            estimate.as_ref().is_some_and(|estimate| estimate.normal_deviation(d, is_point) < STIFF_BELOW)
         };
         let are_flat: SmallVec<[bool; MAX_LANES]> = estimates.iter().zip(are_points).map(is_flat).collect();
         if self.stiff.is_empty() || !are_flat.contains(&true) {

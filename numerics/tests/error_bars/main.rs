@@ -5,6 +5,7 @@ mod common;
 
 mod exact;
 mod jet;
+mod machined;
 mod rows;
 mod sampling;
 mod shapes;

@@ -148,9 +148,12 @@ impl LocalSurface {
             Some(known) => (known.radius, known.least_ratio),
             None => {
                 let radius = if cloud.radius() > 0.0 { cloud.radius() } else { 1.0 };
-                // Unknown and bent points are not sure either.
+                // Where the surface is flat, there is no curvature to be known to a part of its size. Unknown
+                // and bent points are not sure either.
+                let is_curved = |point: &usize| !is_flat(&at_points, *point);
                 let ratio = |point| ratio(&at_points, point, d, radius).unwrap_or(0.0);
-                let ratios: Vec<f64> = (0..cloud.n_points()).into_par_iter().map(ratio).collect();
+                let curved = (0..cloud.n_points()).into_par_iter().filter(is_curved);
+                let ratios: Vec<f64> = curved.map(ratio).collect();
                 (radius, least_ratio(&ratios))
             }
         };
@@ -337,10 +340,11 @@ impl LocalSurface {
         of_side.or_else(|| (!is_resolved).then_some(DegeneracyReason::UnderResolved))
     }
 
-    /// Returns whether the curvatures are known well enough to be used.
+    /// Returns whether the curvatures are known well enough to be used: to a part of their size, or to be
+    /// those of a plane as far as the neighbourhood reaches.
     fn is_resolved(&self, geometry: &PatchGeometry, query: usize) -> bool {
         let ratio = ratio(geometry, query, self.cloud.dimension(), self.radius);
-        ratio.is_some_and(|ratio| ratio >= self.least_ratio)
+        is_flat(geometry, query) || ratio.is_some_and(|ratio| ratio >= self.least_ratio)
     }
 
     /// Turns normals to the side of the normals of nearby points.
@@ -351,6 +355,11 @@ impl LocalSurface {
             if near.along(queries.point(query), normal, &mut found) < 0.0 { -1.0 } else { 1.0 }
         });
     }
+}
+
+/// Returns whether the surface is surely flat in the neighbourhood.
+fn is_flat(geometry: &PatchGeometry, query: usize) -> bool {
+    geometry.curvatures.as_ref().is_some_and(|found| found.is_flat[query])
 }
 
 /// Returns the largest principal curvature over the largest deviation of one, infinite for deviations of 0.
@@ -458,6 +467,7 @@ impl PatchGeometry {
             mean: ordered.given_rows(&own.mean, 1),
             gaussian: ordered.given_rows(&own.gaussian, 1),
             is_bent: ordered.given_rows(&own.is_bent, 1),
+            is_flat: ordered.given_rows(&own.is_flat, 1),
         });
         Self {
             is_known: ordered.given_rows(&self.is_known, 1),
@@ -476,7 +486,11 @@ impl PatchGeometry {
         let vectors = [&self.normals, &self.shapes];
         let numbers = [&self.heights, &self.height_deviations, &self.normal_deviations];
         let of_curvatures = |c: &CurvatureDeviations| {
-            vec_bytes(&c.principal) + vec_bytes(&c.mean) + vec_bytes(&c.gaussian) + vec_bytes(&c.is_bent)
+            vec_bytes(&c.principal)
+                + vec_bytes(&c.mean)
+                + vec_bytes(&c.gaussian)
+                + vec_bytes(&c.is_bent)
+                + vec_bytes(&c.is_flat)
         };
         vectors.into_iter().chain(numbers).map(vec_bytes).sum::<usize>()
             + vec_bytes(&self.is_known)
