@@ -123,6 +123,11 @@ impl Grid {
         // Without a spread, only the size of the values indicates how much they may vary.
         let mean_square = observed.values.iter().map(|v| v * v).sum::<f64>() / observed.values.len() as f64;
         let by_values = if values.is_zero() { 1.0 } else { in_units(1.0, mean_square.sqrt()) };
+        // Rows at one position scatter by their noise, however few there are.
+        let ratio = match (&self.noise, values.scattered_variance()) {
+            (KnownNoise::Unknown, Some(noise)) => ratio.max(noise / by_values),
+            _ => ratio,
+        };
         Learned {
             family,
             length_scale: family.length_scale_of_values(observed.sampling.scales()),

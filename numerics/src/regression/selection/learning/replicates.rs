@@ -71,6 +71,11 @@ impl Replicates {
         self.positions.is_empty()
     }
 
+    /// The scatter of all rows.
+    pub(super) fn scatter(&self) -> Scatter {
+        self.positions.iter().map(|rows| rows.scatter).sum()
+    }
+
     /// The rows that repeat an earlier one, ascending.
     pub(super) fn copies(&self) -> Vec<RowCopy> {
         let mut copies: Vec<RowCopy> = self.positions.iter().flat_map(|rows| &rows.copies).copied().collect();

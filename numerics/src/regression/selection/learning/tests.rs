@@ -165,3 +165,13 @@ fn rows_that_repeat_leave_the_noise_as_it_is() {
         }
     }
 }
+
+#[test]
+fn rows_at_one_place_have_the_noise_that_they_scatter_by() {
+    let cloud = Cloud::new(vec![1.0; 20], 2).unwrap();
+    let values: Vec<f64> = (0..10).map(f64::from).collect();
+    let found = learned(&cloud, &values, Noise::Unknown);
+    // Of their values, 9 degrees of freedom have squares of 82.5. One place decides no kernel.
+    let noise = found.ratio * found.variance;
+    assert!((noise - 82.5 / 9.0).abs() < 1e-9, "{noise}");
+}

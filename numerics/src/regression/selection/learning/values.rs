@@ -1,6 +1,6 @@
 //! Values on which kernels are compared.
 
-use super::replicates::{Replicate, Replicates, Rows};
+use super::replicates::{Replicate, Replicates, Rows, Scatter};
 use super::{Noise, Observed};
 use crate::points::duplicates::RowCopy;
 use crate::regression::solver::trend::Basis;
@@ -63,6 +63,13 @@ impl<'a> Values<'a> {
     /// Returns what the rows at the position of its first point say together. `None` where there is one row.
     pub(super) fn replicate(&self, first: usize) -> Option<&Replicate> {
         self.replicates.at(first)
+    }
+
+    /// Returns the variance of the noise by the scatter of rows at one position, unit V². `None` where no
+    /// position has rows that differ.
+    pub(super) fn scattered_variance(&self) -> Option<f64> {
+        let Scatter { squares, n_degrees } = self.replicates.scatter();
+        (n_degrees > 0).then(|| squares / n_degrees as f64 * self.unit * self.unit)
     }
 
     pub(super) fn n_lists(&self) -> usize {
