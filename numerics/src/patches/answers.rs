@@ -173,8 +173,8 @@ impl Slots<'_> {
 }
 
 impl Patches {
-    /// Computes normals, curvatures and deviations at queries. `is_point` says which of them are points
-    /// of the cloud, with their noise. The others are places that are known exactly.
+    /// Computes normals, curvatures and deviations at queries. Those for which `is_point` is true are points
+    /// of the cloud, with their noise. The others are exact places.
     ///
     /// # Errors
     /// `NumericsError::Cancelled`.

@@ -125,7 +125,9 @@ impl Grid {
         let by_values = if values.is_zero() { 1.0 } else { in_units(1.0, mean_square.sqrt()) };
         // Rows at one position scatter by their noise, however few there are.
         let ratio = match (&self.noise, values.scattered_variance()) {
-            (KnownNoise::Unknown, Some(noise)) => ratio.max(noise / by_values),
+            (KnownNoise::Unknown, Some(noise)) => {
+                ratio.max(noise / (mean_square.sqrt() / values.unit).powi(2))
+            }
             _ => ratio,
         };
         Learned {

@@ -17,7 +17,7 @@ pub(super) struct Replicates {
     positions: Vec<Replicate>,
 }
 
-/// What the rows at a position say together.
+/// The rows at a position, taken together.
 pub(super) struct Replicate {
     /// The first point at the position, which stands for all of them.
     first: usize,

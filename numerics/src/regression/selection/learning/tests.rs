@@ -171,7 +171,19 @@ fn rows_at_one_place_have_the_noise_that_they_scatter_by() {
     let cloud = Cloud::new(vec![1.0; 20], 2).unwrap();
     let values: Vec<f64> = (0..10).map(f64::from).collect();
     let found = learned(&cloud, &values, Noise::Unknown);
-    // Of their values, 9 degrees of freedom have squares of 82.5. One place decides no kernel.
+    // One place decides no kernel. The squares about the mean are 82.5, with 9 degrees of freedom.
     let noise = found.ratio * found.variance;
     assert!((noise - 82.5 / 9.0).abs() < 1e-9, "{noise}");
+}
+
+#[test]
+fn rows_at_one_place_are_read_in_any_unit_and_if_all_are_zero() {
+    let cloud = Cloud::new(vec![1.0; 20], 2).unwrap();
+    for unit in [0.0, 1e-140, 1.0, 1e140] {
+        let values: Vec<f64> = (0..10).map(|row| unit * f64::from(row)).collect();
+        let found = learned(&cloud, &values, Noise::Unknown);
+        let least = if unit > 0.0 { 0.1 } else { 0.0 };
+        assert!(found.ratio.is_finite() && found.ratio >= least, "{unit}: {}", found.ratio);
+        assert!(found.variance.is_finite(), "{unit}: {}", found.variance);
+    }
 }

@@ -65,11 +65,11 @@ impl<'a> Values<'a> {
         self.replicates.at(first)
     }
 
-    /// Returns the variance of the noise by the scatter of rows at one position, unit V². `None` where no
-    /// position has rows that differ.
+    /// Returns the variance of the noise by the scatter of rows at one position, in units of the square of
+    /// the greatest value. `None` where no position has rows that differ.
     pub(super) fn scattered_variance(&self) -> Option<f64> {
         let Scatter { squares, n_degrees } = self.replicates.scatter();
-        (n_degrees > 0).then(|| squares / n_degrees as f64 * self.unit * self.unit)
+        (n_degrees > 0).then(|| squares / n_degrees as f64)
     }
 
     pub(super) fn n_lists(&self) -> usize {
