@@ -1,6 +1,6 @@
 //! Consistent signs for the normals of a cloud.
 
-use super::edges::{Edge, contradiction, join_borders, sheet_edges};
+use super::edges::{Edge, contradiction, join_borders, join_sure_borders, sheet_edges};
 use super::forest::SignedForest;
 use super::parts::Parts;
 use super::pieces::{Bounds, Piece, is_large};
@@ -48,6 +48,9 @@ pub(super) fn consistent_signs(
     let n = sampled.cloud.n_points();
     let mut edges = sheet_edges(sampled, &directions.normals)?;
     let mut forest = joined(&edges, &directions.has_sign);
+    let mut sure = forest.clone();
+    join_sure_borders(&mut sure, &edges);
+    let sheets = Parts::of(&sure.find_all());
     join_borders(&mut forest, &edges);
     let mut is_at_rim = directions.is_at_rim.clone();
     for edge in gaps::join_across(sampled, &directions.normals, &mut forest)? {
@@ -68,7 +71,7 @@ pub(super) fn consistent_signs(
     if !is_resolved || contradiction(&edges, &signs) > CONTRADICTION {
         (0..n).filter(|&point| directions.has_sign[point]).for_each(|point| signs[point] = 1.0);
     } else if !is_given && let Some(field) = Field::of(sampled, &directions.normals, &edges) {
-        let sides = sides::settle(&field, &pieces, &edges, &mut signs)?;
+        let sides = sides::settle(&field, [&sheets, &pieces], &edges, &mut signs)?;
         has_rim.iter_mut().zip(&sides.is_closed).for_each(|(has_rim, is_closed)| *has_rim &= !is_closed);
         is_ambiguous = sides.is_ambiguous;
     }

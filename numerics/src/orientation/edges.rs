@@ -11,6 +11,10 @@ use crate::points::cloud::{Cloud, squared_distance};
 /// Weight up to which two points do not count as neighbours on one sheet.
 const LEAST_WEIGHT: f64 = 0.01;
 
+/// Mean weight of the edges between two regions from which the surface surely leads from one to the other.
+/// Along an edge of a body where normals turn by 120 degrees it is 0.25, with the wrong sign.
+const SURE_BORDER: f64 = 0.5;
+
 /// Points whose edges are found at once.
 pub(super) const BLOCK: usize = 1 << 16;
 
@@ -140,11 +144,22 @@ struct Border {
     a: usize,
     b: usize,
     vote: f64,
+    count: f64,
 }
 
 /// Joins sets of a forest by the vote of their common edges, surest first.
 pub(super) fn join_borders(forest: &mut SignedForest, edges: &[Edge]) {
-    for border in borders(forest, edges) {
+    join(forest, edges, |_| true);
+}
+
+/// Joins sets of a forest whose common edges are sure in the mean, so that no sharp edge of a body lies
+/// between them.
+pub(super) fn join_sure_borders(forest: &mut SignedForest, edges: &[Edge]) {
+    join(forest, edges, |border| border.vote.abs() > SURE_BORDER * border.count);
+}
+
+fn join(forest: &mut SignedForest, edges: &[Edge], is_joined: impl Fn(&Border) -> bool) {
+    for border in borders(forest, edges).iter().filter(|border| is_joined(border)) {
         forest.join(border.a, border.b, border.vote.signum());
     }
 }
@@ -156,13 +171,16 @@ fn borders(forest: &mut SignedForest, edges: &[Edge]) -> Vec<Border> {
         let (a, b) = (found[edge.a()], found[edge.b()]);
         if a.root != b.root {
             let vote = a.sign * b.sign * edge.cosine().signum() * edge.weight();
-            votes.push(Border { a: a.root.min(b.root), b: a.root.max(b.root), vote });
+            votes.push(Border { a: a.root.min(b.root), b: a.root.max(b.root), vote, count: 1.0 });
         }
     }
     // The sort is stable, so that votes of a border are added in the order of the edges.
     votes.sort_by_key(|border| (border.a, border.b));
     let same = |p: &Border, q: &Border| (p.a, p.b) == (q.a, q.b);
-    let total = |chunk: &[Border]| Border { vote: chunk.iter().map(|border| border.vote).sum(), ..chunk[0] };
+    let total = |chunk: &[Border]| {
+        let vote = chunk.iter().map(|border| border.vote).sum();
+        Border { vote, count: chunk.len() as f64, ..chunk[0] }
+    };
     let mut borders: Vec<Border> = votes.chunk_by(same).map(total).collect();
     // Ties are ordered by index.
     borders.sort_by(|p, q| q.vote.abs().total_cmp(&p.vote.abs()).then((p.a, p.b).cmp(&(q.a, q.b))));

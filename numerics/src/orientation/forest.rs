@@ -1,6 +1,7 @@
 //! Disjoint sets of points with signs relative to one another.
 
 /// Disjoint sets whose members have a sign relative to their root.
+#[derive(Clone)]
 pub(super) struct SignedForest {
     parents: Vec<usize>,
     signs: Vec<f64>,

@@ -52,14 +52,14 @@ pub(super) struct Sides {
 /// [`NumericsError::Cancelled`].
 pub(super) fn settle(
     field: &Field<'_>,
-    pieces: &Parts,
+    [sheets, pieces]: [&Parts; 2],
     edges: &[Edge],
     signs: &mut [f64],
 ) -> Result<Sides, NumericsError> {
-    let mut large = pieces.by_size();
-    large.retain(|&piece| pieces.members[piece].len() >= LEAST_PIECE);
-    let turned = Problem::of(field, pieces, &large, signs)?.turned(ON_PIECE);
-    pieces.turn(&turned, signs);
+    turn_wrong(pieces, field, &[], signs)?;
+    if sheets.members.len() > pieces.members.len() {
+        turn_wrong(sheets, field, edges, signs)?;
+    }
     let Turned { misfits, is_cut, unclear } = turn_patches(field, pieces, edges, signs)?;
     let near = pieces.shares(&misfits, |misfit| misfit <= BOUNDS);
     let doubt = |(point, misfit): (usize, f64)| {
@@ -76,6 +76,21 @@ pub(super) fn settle(
     unclear.into_iter().for_each(|point| is_ambiguous[point] = true);
     let off = pieces.shares(&misfits, |misfit| misfit > CLOSED);
     Ok(Sides { is_ambiguous, is_closed: off.iter().map(|share| *share <= MAX_OFF).collect() })
+}
+
+/// Turns large parts that point to the wrong side.
+fn turn_wrong(
+    parts: &Parts,
+    field: &Field<'_>,
+    edges: &[Edge],
+    signs: &mut [f64],
+) -> Result<(), NumericsError> {
+    let mut large = parts.by_size();
+    large.retain(|&part| parts.members[part].len() >= LEAST_PIECE);
+    let problem = Problem::of(field, parts, &large, signs)?.with_springs(parts, edges, signs);
+    let turned = problem.turned(ON_PIECE);
+    parts.turn(&turned, signs);
+    Ok(())
 }
 
 /// Returns whether the neighbours of each point contradict its side, `[n]`.

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use super::clouds::{
-    Sided, along, cassini, folded_strip, half_lens, half_plate, length_of, polar, revolved, revolved_area,
-    ring, sphere, surface_spacing,
+    Sided, along, cassini, faceted, folded_strip, half_cone, half_lens, half_plate, length_of, polar,
+    revolved, revolved_area, ring, sphere, surface_spacing,
 };
 use crate::common::random::Random;
 
@@ -58,6 +58,20 @@ pub fn folded_sheet(n_layers: usize, thickness: f64, seed: u64) -> Case {
     let n = (revolved_area(&outline) * (0.82 * thickness).powi(2)) as usize;
     let name = format!("folded sheet, {n_layers} layers, {thickness}");
     Case::new(name, revolved(&outline, n, &mut Random(seed)), thickness)
+}
+
+/// A solid cone, whose side meets its base at 63 degrees.
+pub fn cone(n: usize, seed: u64) -> Case {
+    Case::new(format!("cone, {n}"), revolved(&half_cone(), n, &mut Random(seed)), f64::INFINITY)
+}
+
+/// A pyramid with a square base, which its sides meet at 56 degrees.
+pub fn pyramid(n: usize, seed: u64) -> Case {
+    let corners = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]];
+    let mut triangles: Vec<_> =
+        (0..4).map(|side| [corners[side], corners[(side + 1) % 4], [0.0, 0.0, 1.5]]).collect();
+    triangles.extend([[corners[0], corners[2], corners[1]], [corners[0], corners[3], corners[2]]]);
+    Case::new(format!("pyramid, {n}"), faceted(&triangles, n, &mut Random(seed)), f64::INFINITY)
 }
 
 /// A round plate with a round rim, `thickness` spacings thick.

@@ -131,6 +131,39 @@ pub fn half_lens(radius: f64, thickness: f64) -> Vec<Place> {
     (0..=4000).map(|i| cap(i, -1.0)).chain((0..=4000).rev().map(|i| cap(i, 1.0))).collect()
 }
 
+/// Half of the section of a solid cone of radius 1 and height 2, from the middle of its base to its tip.
+pub fn half_cone() -> Vec<Place> {
+    let slope = 5f64.sqrt();
+    let side = [2.0 / slope, 1.0 / slope];
+    let base = [0.0, -1.0];
+    vec![([0.0, 0.0], base), ([1.0, 0.0], base), ([1.0, 0.0], side), ([0.0, 2.0], side)]
+}
+
+/// n random points, uniform in area, of flat triangles whose corners turn to the left as seen from outside.
+pub fn faceted(triangles: &[[[f64; 3]; 3]], n: usize, random: &mut Random) -> Sided {
+    let arm = |a: [f64; 3], b: [f64; 3]| [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
+    let normal = |&[a, b, c]: &[[f64; 3]; 3]| {
+        let (u, v) = (arm(a, b), arm(a, c));
+        [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+    };
+    let length = |x: [f64; 3]| x.iter().map(|c| c * c).sum::<f64>().sqrt();
+    let most = triangles.iter().map(|of| length(normal(of))).fold(0.0, f64::max);
+    let mut places = Vec::with_capacity(n);
+    while places.len() < n {
+        let of = &triangles[(random.uniform() * triangles.len() as f64) as usize];
+        let (normal, [mut s, mut t]) = (normal(of), [random.uniform(), random.uniform()]);
+        if random.uniform() * most > length(normal) {
+            continue;
+        }
+        if s + t > 1.0 {
+            (s, t) = (1.0 - s, 1.0 - t);
+        }
+        let at = |c: usize| of[0][c] + s * (of[1][c] - of[0][c]) + t * (of[2][c] - of[0][c]);
+        places.push(([at(0), at(1), at(2)], normal.map(|c| c / length(normal))));
+    }
+    Sided::of(places)
+}
+
 /// A circle with a radius about (at, 0).
 pub fn ring(at: f64, radius: f64) -> Vec<Place> {
     let place = |i: i32| {

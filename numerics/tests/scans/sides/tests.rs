@@ -1,7 +1,7 @@
 //! Bounds on the sides of normals of closed curves and surfaces.
 
 use super::cases::{
-    Case, curves, folded_curve, folded_sheet, lens, nested_spheres, plate, tube, two_spheres,
+    Case, cone, curves, folded_curve, folded_sheet, lens, nested_spheres, plate, pyramid, tube, two_spheres,
 };
 use super::tally::SideTally;
 
@@ -61,7 +61,9 @@ fn both_sides_of_a_lens_point_apart_or_have_flags() {
         for way in [SideTally::dense, SideTally::local] {
             let tally = cases.iter().map(|case| way(&case.sided)).reduce(|a, b| a.with(&b)).unwrap();
             assert!(tally.flipped_unflagged() <= 0.01, "{thickness}: {tally:?}");
-            assert!(tally.flipped() <= 0.2 && tally.off_unflagged() <= 0.003, "{thickness}: {tally:?}");
+            // One spacing thick, half of the points have a flag, and a quarter is flipped.
+            let most = if thickness > 1.0 { 0.2 } else { 0.25 };
+            assert!(tally.flipped() <= most && tally.off_unflagged() <= 0.003, "{thickness}: {tally:?}");
         }
     }
 }
@@ -100,4 +102,21 @@ fn normals_of_a_hollow_ball_point_out_of_its_wall() {
 #[test]
 fn folded_sheets_have_right_sides() {
     check_local(folded_sheet(3, 4.0, 1));
+}
+
+/// Across an edge at which normals turn by 120 degrees, neighbours seem to lie on a surface with the opposite
+/// side. The base of a pyramid was turned over, and all of its sides had flags.
+#[test]
+fn bodies_with_sharp_edges_have_right_sides() {
+    // Points on an edge may have the normal of either side, and those of few points are off beside it.
+    for (n, flipped, off) in [(300, 0.02, 0.04), (1000, 0.01, 0.03), (4000, 0.01, 0.01)] {
+        for of in [cone, pyramid] {
+            let cases: Vec<Case> = (1..=3).map(|seed| of(n, seed)).collect();
+            let tallies = cases.iter().map(|case| SideTally::local(&case.sided));
+            let tally = tallies.reduce(|a, b| a.with(&b)).unwrap();
+            assert!(tally.wrong_of_unflagged() <= flipped, "{}: {tally:?}", cases[0].name);
+            assert!(tally.off_unflagged() <= off, "{}: {tally:?}", cases[0].name);
+            assert!(tally.ambiguous() <= 0.1, "{}: {tally:?}", cases[0].name);
+        }
+    }
 }
