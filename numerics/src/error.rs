@@ -75,6 +75,15 @@ pub enum NumericsError {
         closedness: f64,
     },
     #[error(
+        "{:.0} % of the vertices of the mesh are farther than three spacings from all points; ask for the surface local, let it \
+         be open if it ends with its points, or set bounds",
+        100.0 * share
+    )]
+    UnsupportedMesh {
+        /// Share of the vertices that are far from all points.
+        share: f64,
+    },
+    #[error(
         "the surface needs more than {limit} nodes of a lattice with this step; make it longer, or set bounds"
     )]
     TooManyNodes { limit: usize },

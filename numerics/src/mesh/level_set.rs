@@ -12,7 +12,7 @@ use super::lattice::nodes::{Lattice, Node};
 use super::lattice::roots::Crossings;
 use super::parts::{Part, Parts};
 use super::regular::regular;
-use super::support::{Support, nearest_points, observed, support};
+use super::support::{Support, far, nearest_points, observed, support};
 use crate::error::{NumericsError, Result};
 use crate::observer::{Observer, Stage};
 use crate::points::neighbours::Neighbour;
@@ -69,6 +69,13 @@ pub struct LevelSet {
     pub quality: Quality,
 }
 
+impl LevelSet {
+    /// Share of the vertices that are farther than three spacings from all points.
+    pub fn share_far(&self) -> f64 {
+        self.parts.iter().map(|part| part.n_far).sum::<usize>() as f64 / self.mesh.n_vertices().max(1) as f64
+    }
+}
+
 /// Meshes the level set.
 ///
 /// # Errors
@@ -90,7 +97,7 @@ pub fn level_set(request: &LevelSetRequest<'_>, observer: &dyn Observer) -> Resu
         quality => (raw, quality),
     };
     let (mesh, feet) = settled(mesh, field, SETTLED * request.step, observer)?;
-    let parts = Parts::of(&mesh).parts;
+    let parts = Parts::of(&mesh).with_far(&far(&mesh, request.sampling));
     let support = support(&mesh, request.sampling);
     Ok(LevelSet { normals: feet.normals, residuals: feet.distances, support, parts, dropped, quality, mesh })
 }

@@ -6,7 +6,7 @@ use super::Mesh;
 use super::places::size;
 
 /// One connected part of a mesh.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Part {
     pub n_vertices: usize,
     pub n_cells: usize,
@@ -17,6 +17,8 @@ pub struct Part {
     pub n_boundary_edges: usize,
     /// Length (d = 2, unit L) or area (d = 3, unit L²).
     pub area: f64,
+    /// Vertices that are farther than three spacings from all points. 0 until they are counted.
+    pub n_far: usize,
 }
 
 /// The parts of a mesh, largest first, and the part of each vertex, `[k]`.
@@ -29,11 +31,7 @@ impl Parts {
     pub fn of(mesh: &Mesh) -> Self {
         let labels = mesh.labels(|_, _| true);
         let n_parts = labels.iter().map(|&label| label as usize + 1).max().unwrap_or(0);
-        let mut parts =
-            vec![
-                Part { n_vertices: 0, n_cells: 0, euler_characteristic: 0, n_boundary_edges: 0, area: 0.0 };
-                n_parts
-            ];
+        let mut parts = vec![Part::default(); n_parts];
         for &label in &labels {
             parts[label as usize].n_vertices += 1;
             parts[label as usize].euler_characteristic += 1;
@@ -52,6 +50,16 @@ impl Parts {
             part.euler_characteristic -= i64::from(d == 3);
         }
         largest_first(parts, labels)
+    }
+}
+
+impl Parts {
+    /// The parts with the vertices that are far from all points, `[k]`, counted.
+    pub fn with_far(mut self, is_far: &[bool]) -> Vec<Part> {
+        for (&part, &is_far) in self.of_vertex.iter().zip(is_far) {
+            self.parts[part as usize].n_far += usize::from(is_far);
+        }
+        self.parts
     }
 }
 

@@ -13,6 +13,9 @@ const OBSERVED: f64 = 2.0;
 /// is a guess.
 const BRIDGED: f64 = 8.0;
 
+/// Distance to the nearest point, in spacings there, from which a vertex is far from all points.
+const FAR: f64 = 3.0;
+
 /// What a vertex rests on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Support {
@@ -38,6 +41,11 @@ pub(super) fn nearest_points(mesh: &Mesh, sampling: &Sampling) -> Vec<Neighbour>
 /// True for each vertex that has points near it, `[k]`.
 pub(super) fn observed(nearest: &[Neighbour], sampling: &Sampling) -> Vec<bool> {
     nearest.iter().map(|near| spacings(near, sampling) <= OBSERVED).collect()
+}
+
+/// True for each vertex that is far from all points, `[k]`.
+pub(super) fn far(mesh: &Mesh, sampling: &Sampling) -> Vec<bool> {
+    nearest_points(mesh, sampling).iter().map(|near| spacings(near, sampling) > FAR).collect()
 }
 
 /// The distance of a vertex from its nearest point, in spacings there.

@@ -27,6 +27,10 @@ use crate::surface::curvature::principal_curvatures;
 const MARGIN_OF_RADIUS: f64 = 0.2;
 const MARGIN_OF_SPACING: f64 = 4.0;
 
+/// Share of the vertices far from all points beyond which a mesh is not that of the cloud. Holes that are
+/// bridged have a few per cent, sheets through the inside of a body a fifth.
+const MOST_FAR: f64 = 0.05;
+
 /// Options of a mesh.
 #[derive(Debug, Clone)]
 pub struct MeshOptions {
@@ -44,7 +48,8 @@ pub struct MeshOptions {
 /// Meshes the surface of a cloud. Also returns how far its points enclose something.
 ///
 /// # Errors
-/// `NumericsError::OpenSurface` if they do not and `is_open` does not say so. Also the errors of
+/// `NumericsError::OpenSurface` if they do not and `is_open` does not say so.
+/// `NumericsError::UnsupportedMesh` if many vertices are far from all points. Also the errors of
 /// [`level_set`].
 pub fn mesh_of_surface(
     surface: &Surface,
@@ -59,7 +64,9 @@ pub fn mesh_of_surface(
         Ok(closedness)
     };
     let mesh = |field: &dyn Field, seeds: &Seeds<'_>| {
-        level_set(&Sampled { cloud, sampling }.request(field, seeds, options), observer)
+        let found = level_set(&Sampled { cloud, sampling }.request(field, seeds, options), observer)?;
+        let share = found.share_far();
+        if share > MOST_FAR { Err(NumericsError::UnsupportedMesh { share }) } else { Ok(found) }
     };
     match surface {
         Surface::Local(local) => {

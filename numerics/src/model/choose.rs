@@ -19,6 +19,13 @@ pub const LOCAL_FROM: usize = 5_000;
 /// on, and of 50 all but those too coarse for any method.
 pub const LOCAL_CURVES_FROM: usize = 64;
 
+/// Number of points from which `auto` regresses a surface in space locally, for its mesh.
+///
+/// With the short kernel of level sets, the signature function of thousands of points has sheets inside of
+/// the body: from 3,000 points on a cube, or 3,600 on a cone, a star or a bumpy sphere, a fifth of the
+/// vertices lay far from any point. Local regressions mesh all bodies that were tried from 300 points on.
+pub const LOCAL_MESHES_FROM: usize = 300;
+
 /// Reason why `auto` chose another solver than the dense one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AutoReason {
@@ -30,6 +37,8 @@ pub enum AutoReason {
     Deviations,
     /// The level set of a finely sampled curve is requested.
     FineCurve,
+    /// The mesh of a surface is requested.
+    Mesh,
     /// Few landmarks span the kernels of all points.
     FewLandmarks,
     /// The cloud has more points than the dense solver accepts, and the request names a tolerance, which only
@@ -87,6 +96,7 @@ pub fn prefers_local(surface: &UnfittedSurface, max_dense_points: usize) -> Opti
         2..=MAX_LOCAL_DIMENSION if has_deviations => Some(AutoReason::Deviations),
         2..=MAX_LOCAL_DIMENSION if n_points >= LOCAL_FROM => Some(AutoReason::ManyPoints),
         2 if purpose == Purpose::LevelSets && n_points >= LOCAL_CURVES_FROM => Some(AutoReason::FineCurve),
+        3 if purpose == Purpose::LevelSets && n_points >= LOCAL_MESHES_FROM => Some(AutoReason::Mesh),
         _ => None,
     }
 }

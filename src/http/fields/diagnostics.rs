@@ -94,11 +94,15 @@ pub enum WarningCode {
     PartsDropped,
     /// A mesh goes on where there are no points.
     Bridged,
+    /// Vertices of a mesh are farther than three spacings from all points.
+    FarVertices,
     /// Values contradict kernel and noise, so deviations are too short. If the warning names a value, perhaps
     /// only around it.
     Misfit,
     /// Rows repeat points and values of an earlier one. They count once when kernel and noise are learned.
     RepeatedRows,
+    /// Coordinates of the points have so different spreads that one length scale does not serve them all.
+    UnitsDiffer,
 }
 
 /// Something that was changed, or that limits the accuracy of the answer.

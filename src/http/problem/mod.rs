@@ -135,6 +135,7 @@ pub fn from_numerics(error: NumericsError, pointers: Pointers) -> Problem {
             not_positive_definite(reason, minimum_alpha, &detail, pointers)
         }
         E::OpenSurface { .. } => at(INVALID_REQUEST, "/open"),
+        E::UnsupportedMesh { .. } => at(INVALID_REQUEST, "/surface"),
         E::TooManyNodes { .. } => at(INVALID_REQUEST, "/step"),
         E::Unsupported { .. } => at(UNSUPPORTED_BY_SOLVER, "/solver"),
         E::RankTooLarge { .. } => {

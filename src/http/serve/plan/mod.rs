@@ -111,6 +111,7 @@ pub fn words(reason: AutoReason) -> &'static str {
             "the cloud has more points than a dense factorization may have, and the request names a tolerance"
         }
         AutoReason::FineCurve => "the level set of a finely sampled curve comes from local regressions",
+        AutoReason::Mesh => "the mesh of a surface comes from local regressions",
     }
 }
 

@@ -194,6 +194,19 @@ fn warning_of_support(support: &[Support]) -> Option<Warning> {
     })
 }
 
+/// Warns of vertices that are far from all points.
+fn warning_of_far(parts: &[Part]) -> Option<Warning> {
+    let n_far: usize = parts.iter().map(|part| part.n_far).sum();
+    (n_far > 0).then(|| {
+        let n: usize = parts.iter().map(|part| part.n_vertices).sum();
+        let percent = 100.0 * n_far as f64 / n as f64;
+        let detail = format!(
+            "vertices farther than three spacings from all points: {n_far}, {percent:.2} %; parts has their numbers"
+        );
+        Warning { code: WarningCode::FarVertices, detail }
+    })
+}
+
 fn answer(
     work: &LevelSetWork,
     meshed: Meshed,
@@ -208,6 +221,7 @@ fn answer(
     }
     diagnostics.warnings.extend(warning_of_dropped(&parts, &dropped));
     diagnostics.warnings.extend(warning_of_support(&support));
+    diagnostics.warnings.extend(warning_of_far(&parts));
     let mut cells = mesh.cells;
     if is_turned(work) {
         normals.iter_mut().for_each(|c| *c = -*c);
@@ -258,7 +272,7 @@ impl From<Support> for VertexSupport {
 
 impl From<Part> for MeshPart {
     fn from(part: Part) -> Self {
-        let Part { n_vertices, n_cells, euler_characteristic, n_boundary_edges, area } = part;
-        Self { n_vertices, n_cells, euler_characteristic, n_boundary_edges, area }
+        let Part { n_vertices, n_cells, euler_characteristic, n_boundary_edges, area, n_far } = part;
+        Self { n_vertices, n_cells, euler_characteristic, n_boundary_edges, area, n_far_vertices: n_far }
     }
 }

@@ -112,6 +112,8 @@ pub struct MeshPart {
     pub n_boundary_edges: usize,
     /// The area in the square of the unit of the points, or the length of a curve.
     pub area: f64,
+    /// Number of its vertices that are farther than three spacings from all points.
+    pub n_far_vertices: usize,
 }
 
 answer! {
