@@ -57,5 +57,6 @@ mod support;
 mod surfaces;
 mod tiles;
 mod tls;
+mod units_differ;
 mod unsolvable;
 mod values;

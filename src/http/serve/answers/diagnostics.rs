@@ -6,6 +6,7 @@ use crate::http::fields::{
 use crate::http::serve::fitted::FitModel;
 use crate::http::serve::plan::words;
 use gramian_numerics::model::Report;
+use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::regression::solver::trend::Trend;
 use gramian_numerics::regression::solver::{Disagreement, Method, Outlier};
 use gramian_numerics::regression::sums::regularization::Regularization;
@@ -113,6 +114,9 @@ impl FitModel {
                 warn(WarningCode::RepeatedRows, detail);
             }
         }
+        if plan.process.is_learned {
+            units_differ(&plan.fitted).into_iter().for_each(|detail| warn(WarningCode::UnitsDiffer, detail));
+        }
         if plan.has_least_variance() {
             warn(WarningCode::VarianceClamped, TOO_SMALL.to_owned());
         }
@@ -150,4 +154,24 @@ impl FitModel {
         let remedy = if is_learned { MISFIT_OF_LEARNED } else { MISFIT_OF_GIVEN };
         diagnostics.warn_of_misfit(found, remedy);
     }
+}
+
+/// Least ratio of the spreads of two coordinates that are worth a warning.
+const UNITS: f64 = 10.0;
+
+/// Says which coordinates of a cloud have the most different spreads, if one length scale was learned for
+/// all.
+fn units_differ(cloud: &Cloud) -> Option<String> {
+    let (least, most) = cloud.bounding_box();
+    let spreads = || most.iter().zip(&least).map(|(most, least)| most - least).enumerate();
+    let varying = || spreads().filter(|(_, spread)| *spread > 0.0);
+    let (widest, most) = varying().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let (narrowest, least) = varying().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    (most > UNITS * least).then(|| {
+        format!(
+            "coordinate {widest} of the points varies {:.0} times as much as coordinate {narrowest}, and one length scale was learned \
+             for all; if their units differ, scale them, or send kernel.length_scales, which /v1/model-selection finds",
+            most / least
+        )
+    })
 }
