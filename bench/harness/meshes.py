@@ -2,6 +2,8 @@
 
 The meshes are four resolutions of the dragon, and the cortex. The cortex is the surfaces of white and grey
 matter of a mean brain (fsaverage5). Its folds are about as thin as the distance between its vertices.
+
+The second table has six of them with noise, beside the best plane fit.
 """
 
 import base64
@@ -14,10 +16,12 @@ import urllib.request
 import zipfile
 import zlib
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from .clouds import Floats
 from .scale.data import Dragon, of_mesh
@@ -32,6 +36,13 @@ OFF = np.cos(np.radians(30))
 #: length is 1 where all normals are equal.
 AGREE = 0.9
 
+#: Noise of scans in median distances of nearest points, and numbers of neighbours of plane fits.
+NOISES = [0.0, 0.1, 0.3, 0.5]
+NEIGHBOURS = [8, 16, 32, 64, 128]
+
+#: Deviations within which 95 % of normally distributed errors lie.
+BAND = 1.96
+
 
 def main() -> None:
     print("| mesh | points | flagged | for its side | off | flipped | flipped, flagged ones too |\n" + "|---" * 7 + "|")
@@ -40,6 +51,28 @@ def main() -> None:
         print(row(f"dragon {level}", *dragon.mesh(level)), flush=True)
     for surface in SURFACES:
         print(row(surface.replace("_", " "), *cortex(surface)), flush=True)
+    print("\n| scan | noise, spacings | normals, median | best plane fit | covered |\n" + "|---" * 5 + "|")
+    scans = [(f"dragon {level}", dragon.mesh(level)) for level in (2, 3, 4)]
+    scans += [(surface.replace("_", " "), cortex(surface)) for surface in (SURFACES[0], SURFACES[2], SURFACES[3])]
+    for name, mesh in scans:
+        known = Known.of(*mesh)
+        for noise in NOISES:
+            print(noisy_row(name, known, noise), flush=True)
+
+
+class Known(NamedTuple):
+    """Points of a mesh with the normals of its faces, where these agree."""
+
+    points: Floats
+    normals: Floats
+    is_known: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, vertices: Floats, faces: NDArray[np.int64]) -> "Known":
+        points, sums, areas = of_mesh(vertices, faces)
+        lengths = np.linalg.norm(sums, axis=1)
+        normals = sums / np.where(lengths > 0, lengths, 1)[:, None]
+        return cls(points, normals, (lengths >= AGREE * areas) & (areas > 0))
 
 
 def row(name: str, vertices: Floats, faces: NDArray[np.int64]) -> str:
@@ -47,10 +80,7 @@ def row(name: str, vertices: Floats, faces: NDArray[np.int64]) -> str:
 
     Only points whose faces agree count. `off` and `flipped` are shares of the normals without a flag.
     """
-    points, sums, areas = of_mesh(vertices, faces)
-    lengths = np.linalg.norm(sums, axis=1)
-    is_known = (lengths >= AGREE * areas) & (areas > 0)
-    expected = sums / np.where(lengths > 0, lengths, 1)[:, None]
+    points, expected, is_known = Known.of(vertices, faces)
     answer = ask({"cloud": {"points": points.tolist()}, "solver": "local"})
     normals = np.array([normal or [0.0] * 3 for normal in answer["normals"]])
     flags = {entry["query"]: entry["reason"] for entry in answer["degenerate"]}
@@ -66,6 +96,33 @@ def row(name: str, vertices: Floats, faces: NDArray[np.int64]) -> str:
         (cosines[is_known] < 0).mean(),
     ]
     return f"| {name} | {len(points):,} | " + " | ".join(f"{share:.2%}" for share in shares) + " |"
+
+
+def noisy_row(name: str, known: Known, noise: float) -> str:
+    """Adds noise to a scan, and compares the service with the plane fit of the best of several sizes."""
+    tree = cKDTree(known.points)
+    spacing = np.median(tree.query(known.points, 2)[0][:, 1])
+    moved = known.points + noise * spacing * np.random.default_rng(3).normal(size=known.points.shape)
+    answer = ask({"cloud": {"points": moved.tolist()}, "solver": "local", "include": ["deviations"]})
+    found = np.array([normal or [0.0] * 3 for normal in answer["normals"]])
+    bars = np.array([bar or 0.0 for bar in answer["normal_deviations"]])
+    off = angles(found, known)
+    best = min(np.median(angles(planes(moved, count), known)) for count in NEIGHBOURS)
+    covered = (off <= BAND * bars[known.is_known]).mean()
+    median, best = np.degrees([np.median(off), best])
+    return f"| {name} | {noise} | {median:.2f}° | {best:.2f}° | {covered:.0%} |"
+
+
+def angles(normals: Floats, known: Known) -> Floats:
+    cosines = np.abs(np.einsum("ij,ij->i", normals, known.normals))[known.is_known]
+    return np.arccos(np.clip(cosines, 0, 1))
+
+
+def planes(points: Floats, count: int) -> Floats:
+    """Returns the normals of least squares planes through the nearest points."""
+    near = points[cKDTree(points).query(points, count)[1]]
+    arms = near - near.mean(axis=1, keepdims=True)
+    return np.linalg.eigh(np.einsum("nka,nkb->nab", arms, arms))[1][:, :, 0]
 
 
 def ask(body: dict[str, object]) -> dict[str, list]:

@@ -4,6 +4,8 @@
 //! `cargo run --release --example error_bars_sweep [points per row]`, 10,000 by
 //! default. It takes a few minutes.
 
+#[path = "../tests/error_bars/carved.rs"]
+mod carved;
 #[path = "../tests/common/mod.rs"]
 mod common;
 #[path = "../tests/error_bars/jet.rs"]
@@ -15,6 +17,7 @@ mod shapes;
 #[path = "../tests/error_bars/sweep.rs"]
 mod sweep;
 
+use carved::{Comparison, carved};
 use rayon::prelude::*;
 use sampling::SAMPLINGS;
 use shapes::{HELD_OUT, SHAPES, Shape};
@@ -27,6 +30,12 @@ const SIZES: [usize; 4] = [300, 1000, 4000, 10_000];
 const HEADER: &str = "\
 | shape | sampling | n | noise | normal | mean | κ₁ | κ₂ | error | angle | flagged | off by half | |
 |---|---|---|---|---|---|---|---|---|---|---|---|---|";
+
+/// Noise of carved spheres, in spacings, and the heads of their table.
+const NOISES_OF_CARVED: [f64; 3] = [0.1, 0.3, 0.5];
+const CARVED: &str = "\
+| noise, spacings | learned | normals, median | best plane fit | covered |
+|---|---|---|---|---|";
 
 fn main() {
     let n_wanted: usize = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(10_000);
@@ -46,6 +55,8 @@ fn main() {
     }
     println!("All: {}", summary(&rows, |_| true));
     println!("Shapes held out: {}", summary(&held_out, |_| true));
+    println!("\n{CARVED}");
+    NOISES_OF_CARVED.into_iter().for_each(print_carved);
 }
 
 fn cases(shapes: &[Shape]) -> Vec<Case> {
@@ -84,4 +95,10 @@ fn print_row(case: &Case, row: &Row) {
         row.off(),
         if row.holds(case.noise) { "" } else { "†" }
     );
+}
+
+fn print_carved(spacings: f64) {
+    let Comparison { noise, median, plane, covered } = carved(spacings);
+    let [median, plane] = [median, plane].map(f64::to_degrees);
+    println!("| {spacings} | {:.2} | {median:.2}° | {plane:.2}° | {covered:.0} % |", noise * spacings);
 }

@@ -7,7 +7,7 @@ use gramian_host::wire::digest::update_with_floats;
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::model::Recipe;
-use gramian_numerics::patches::PatchKernel;
+use gramian_numerics::patches::{NoiseRatio, PatchKernel};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::duplicates::RowCopy;
 use gramian_numerics::regression::solver::trend::Mean;
@@ -227,15 +227,27 @@ fn update_with_regularization(hasher: &mut blake3::Hasher, regularization: &Regu
 
 fn update_with_hyperparameters(hasher: &mut blake3::Hasher, known: &SurfaceHyperparameters) {
     let SurfaceHyperparameters { regression, radius, least_ratio } = known;
-    hasher.update(&regression.points_per_mean.to_le_bytes());
     let PatchKernel { length_scale, variance } = regression.kernel;
-    update_with_floats(hasher, &[regression.noise, length_scale, variance, *radius, *least_ratio]);
+    update_with_floats(
+        hasher,
+        &[regression.noise, regression.bend_noise, length_scale, variance, *radius, *least_ratio],
+    );
     let mixtures =
         [&regression.noise_ratios, &regression.flat_noise_ratios, &regression.quartic_noise_ratios];
-    for mixture in mixtures {
-        hasher.update(&[mixture.len() as u8]);
-        mixture.iter().for_each(|of| update_with_floats(hasher, &[of.ratio, of.log_share]));
+    mixtures.into_iter().for_each(|mixture| update_with_mixture(hasher, mixture));
+    hasher.update(&[regression.coarser.len() as u8]);
+    for level in &regression.coarser {
+        hasher.update(&level.points_per_mean.to_le_bytes());
+        update_with_mixture(hasher, &level.noise_ratios);
+        update_with_mixture(hasher, &level.flat_noise_ratios);
+        update_with_floats(hasher, &level.agreement.normals);
+        update_with_floats(hasher, &level.agreement.curvatures);
     }
+}
+
+fn update_with_mixture(hasher: &mut blake3::Hasher, mixture: &[NoiseRatio]) {
+    hasher.update(&[mixture.len() as u8]);
+    mixture.iter().for_each(|of| update_with_floats(hasher, &[of.ratio, of.log_share]));
 }
 
 #[cfg(test)]

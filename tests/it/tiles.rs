@@ -20,7 +20,7 @@ async fn a_part_with_the_hyperparameters_of_the_whole_answers_as_the_whole() {
     let ask = |cloud: &[[f64; 3]]| json!({"cloud": {"points": cloud}, "solver": "local", "include": ["deviations"], "queries": queries});
     let whole = server.post("/v1/curvatures", &ask(&points)).await.expect_ok();
     let known = &whole["diagnostics"]["hyperparameters"];
-    assert_eq!((&known["points_per_mean"], &whole["diagnostics"]["reach"]), (&json!(1), &json!(152)));
+    assert_eq!((&known["means"], &whole["diagnostics"]["reach"]), (&json!([]), &json!(152)));
     let mut body = ask(&part);
     body["hyperparameters"] = known.clone();
     let answer = server.post("/v1/curvatures", &body).await.expect_ok();
@@ -44,9 +44,17 @@ async fn hyperparameters_out_of_range_are_refused_by_their_place() {
         changed[member] = value;
         json!({"cloud": cloud, "solver": "local", "hyperparameters": changed})
     };
+    let level = |points_per_mean: usize, n_shares: usize| {
+        let shares = vec![0.1; n_shares];
+        json!({"points_per_mean": points_per_mean, "noise_ratios": [], "flat_noise_ratios": [],
+            "normal_bias_shares": shares, "curvature_bias_shares": vec![0.1; 9]})
+    };
     let ratio = |ratio: f64, log_share: f64| json!({"ratio": ratio, "log_share": log_share});
     let cases = [
-        (with("points_per_mean", json!(0)), "points_per_mean"),
+        (with("means", json!([level(1, 9)])), "means/0/points_per_mean"),
+        (with("means", json!([level(8, 9), level(8, 9)])), "means/1/points_per_mean"),
+        (with("means", json!([level(8, 8)])), "means/0/normal_bias_shares"),
+        (with("means", json!(vec![level(8, 9); 7])), "means"),
         (with("noise_deviation", json!(-1.0)), "noise_deviation"),
         (with("radius", json!(0.0)), "radius"),
         (with("noise_ratios", json!([ratio(0.0, -1.0), ratio(-1.0, -1.0)])), "noise_ratios/1"),

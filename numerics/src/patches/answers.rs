@@ -3,12 +3,13 @@
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
-use super::Patches;
 use super::estimate::Estimate;
+use super::level::Level;
 use super::neighbourhood::Neighbourhood;
 use super::pooled::Weighted;
 use super::regression::{Kriged, n_terms};
 use super::room::{Purpose, Room};
+use super::{Coarser, Patches};
 use crate::error::{NumericsError, Result};
 use crate::machine::instruction_set::InstructionSet;
 use crate::machine::lanes::MAX_LANES;
@@ -18,6 +19,7 @@ use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 
 /// Geometry of the surface at m queries, in flat arrays. Entries of queries without an answer are zero.
+#[derive(Clone)]
 pub struct PatchGeometry {
     /// True for queries with an answer, `[m]`.
     pub is_known: Vec<bool>,
@@ -40,7 +42,7 @@ pub struct PatchGeometry {
 
 /// Standard deviations of curvatures in flat arrays, unit 1/L, and 1/L^{d−1} for the Gaussian one. Those of
 /// principal curvatures are in the ascending order of the curvatures for the normals they come with.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct CurvatureDeviations {
     /// Principal curvatures, `[m, d−1]`.
     pub principal: Vec<f64>,
@@ -71,7 +73,7 @@ const SURELY: f64 = 2.0;
 const STIFF_BELOW: f64 = 0.03;
 
 impl PatchGeometry {
-    fn unknown(m: usize, d: usize, with_deviations: bool) -> Self {
+    pub(super) fn unknown(m: usize, d: usize, with_deviations: bool) -> Self {
         let curvatures = with_deviations.then(|| CurvatureDeviations {
             principal: vec![0.0; m * (d - 1)],
             mean: vec![0.0; m],
@@ -179,6 +181,28 @@ impl Patches {
     /// # Errors
     /// `NumericsError::Cancelled`.
     pub fn at(
+        &self,
+        queries: &Cloud,
+        is_point: &(dyn Fn(usize) -> bool + Sync),
+        with_deviations: bool,
+        observer: &dyn Observer,
+    ) -> Result<PatchGeometry> {
+        // What coarser levels are worth, curvatures decide too.
+        let with_deviations = with_deviations || !self.coarser.is_empty();
+        let mut geometry = self.finest.at(queries, is_point, with_deviations, observer)?;
+        for Coarser { level, agreement } in &self.coarser {
+            geometry.refine(&level.at(queries, is_point, true, observer)?, agreement, queries.dimension());
+        }
+        Ok(geometry)
+    }
+}
+
+impl Level {
+    /// Computes normals, curvatures and deviations at queries by this level alone.
+    ///
+    /// # Errors
+    /// `NumericsError::Cancelled`.
+    pub(super) fn at(
         &self,
         queries: &Cloud,
         is_point: &(dyn Fn(usize) -> bool + Sync),

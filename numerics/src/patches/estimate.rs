@@ -25,6 +25,12 @@ const MEAN_MAGNITUDE: f64 = 0.8;
 /// error in the plane with equal deviations of 1.
 const SECOND_DIRECTION: f64 = 0.56;
 
+/// Returns the variance of one component of a normal with this deviation, if all k components are known
+/// equally well.
+pub(super) fn normal_variance(deviation: f64, k: usize) -> f64 {
+    (deviation / NORMAL_CALIBRATION).powi(2) / (1.0 + SECOND_DIRECTION * (k - 1) as f64)
+}
+
 /// Height over a tangent plane with its derivatives up to second order and their covariance.
 ///
 /// All are in units of the radius of the neighbourhood. Variances of curvatures hold fourth powers of

@@ -11,12 +11,15 @@
 mod answers;
 mod estimate;
 mod learning;
+mod level;
+mod levels;
 mod means;
 mod neighbourhood;
 mod pooled;
 pub(crate) mod price;
 mod regression;
 mod room;
+mod slopes;
 
 use std::sync::Arc;
 
@@ -25,7 +28,9 @@ use super::machine::heap::vec_bytes;
 use super::observer::Observer;
 use super::points::cloud::Cloud;
 use super::points::sampling::Sampling;
-pub use learning::MAX_SITES;
+pub use learning::{MAX_COARSER, MAX_SITES};
+use level::Level;
+pub use levels::{Agreement, N_BIASES};
 use means::Support;
 use neighbourhood::n_neighbours;
 pub use pooled::MAX_MODELS;
@@ -49,32 +54,49 @@ pub struct NoiseRatio {
 /// the whole is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PatchHyperparameters {
-    /// Most points per mean that a regression sees, 1 where it sees the points themselves.
-    pub points_per_mean: usize,
     /// Mixture of noise ratios, at most [`MAX_MODELS`]. Empty where nothing can be regressed.
     pub noise_ratios: Vec<NoiseRatio>,
     /// Mixture for the slopes where the surface is flat. Empty where there is no noise.
     pub flat_noise_ratios: Vec<NoiseRatio>,
     /// Mixture for a trend of fourth order. Empty where points have noise, or a quadric is as sure.
     pub quartic_noise_ratios: Vec<NoiseRatio>,
+    /// Levels of means, ascending by their points. Empty where points have no noise, or means are no surer.
+    pub coarser: Vec<CoarserHyperparameters>,
     /// σ: standard deviation of the noise of the points across the surface, unit L.
     pub noise: f64,
+    /// σ, or 0 where it may be bends of a coarsely sampled surface: noise that neighbourhoods do not take for
+    /// a bend, unit L.
+    pub bend_noise: f64,
     /// Kernel of the heights: medians over the sites.
     pub kernel: PatchKernel,
 }
 
-/// Local regressions of the surface that a cloud samples, d ≥ 2.
+/// Hyperparameters of a level of means.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CoarserHyperparameters {
+    /// Most points of a mean, at least 2.
+    pub points_per_mean: usize,
+    /// Mixtures as for the points.
+    pub noise_ratios: Vec<NoiseRatio>,
+    pub flat_noise_ratios: Vec<NoiseRatio>,
+    /// How far the level is off those before it.
+    pub agreement: Agreement,
+}
+
+/// Local regressions of the surface that a cloud samples, d ≥ 2: over the points, and where they have noise
+/// over means of more and more of them.
 pub struct Patches {
-    support: Support,
-    models: Vec<Weighted>,
-    /// Models for the slopes where the surface is flat. Empty where there is no noise.
-    stiff: Vec<Weighted>,
-    /// Models with a trend of fourth order, where points are exact and the surface is smooth enough.
-    quartic: Vec<Weighted>,
-    /// Points, or means, in a neighbourhood. Below `n_terms(d) + 2`, no query has an answer.
-    count: usize,
+    finest: Level,
+    /// Levels of means, ascending by their points.
+    coarser: Vec<Coarser>,
     noise: f64,
     kernel: PatchKernel,
+}
+
+/// A level of means, and how far it is off the levels before it.
+struct Coarser {
+    level: Level,
+    agreement: Agreement,
 }
 
 /// Hyperparameters of the covariance of the heights: medians over the sites.
@@ -97,39 +119,47 @@ impl Patches {
         sampling: Arc<Sampling>,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
-        let d = cloud.dimension();
-        check_dimension(d)?;
-        let support = Support::of(hyperparameters.points_per_mean, cloud, sampling, observer)?;
-        Ok(Self {
-            count: n_neighbours(d, support.cloud().n_points()),
-            support,
-            models: Kind::Plain.mixture(&hyperparameters.noise_ratios),
-            stiff: Kind::Stiff.mixture(&hyperparameters.flat_noise_ratios),
-            quartic: Kind::Quartic.mixture(&hyperparameters.quartic_noise_ratios),
-            noise: hyperparameters.noise,
-            kernel: hyperparameters.kernel,
-        })
+        check_dimension(cloud.dimension())?;
+        let over = |group: usize| {
+            Support::of(group, cloud.clone(), sampling.clone(), observer)
+                .map(|support| Level::of(support, hyperparameters.bend_noise))
+        };
+        let mut finest = over(1)?;
+        finest.models = Kind::Plain.mixture(&hyperparameters.noise_ratios);
+        finest.stiff = Kind::Stiff.mixture(&hyperparameters.flat_noise_ratios);
+        finest.quartic = Kind::Quartic.mixture(&hyperparameters.quartic_noise_ratios);
+        let mut coarser = Vec::with_capacity(hyperparameters.coarser.len());
+        for known in &hyperparameters.coarser {
+            let mut level = over(known.points_per_mean)?;
+            level.models = Kind::Plain.mixture(&known.noise_ratios);
+            level.stiff = Kind::Stiff.mixture(&known.flat_noise_ratios);
+            coarser.push(Coarser { level, agreement: known.agreement.clone() });
+        }
+        Ok(Self { finest, coarser, noise: hyperparameters.noise, kernel: hyperparameters.kernel })
     }
 
     /// Returns what was learned, or given.
     pub fn hyperparameters(&self) -> PatchHyperparameters {
-        let ratios = |models: &[Weighted]| {
-            let ratio = |of: &Weighted| NoiseRatio { ratio: of.model.noise, log_share: of.log_share };
-            models.iter().map(ratio).collect()
+        let of_level = |Coarser { level, agreement }: &Coarser| CoarserHyperparameters {
+            points_per_mean: level.support.points_per_mean(),
+            noise_ratios: ratios(&level.models),
+            flat_noise_ratios: ratios(&level.stiff),
+            agreement: agreement.clone(),
         };
         PatchHyperparameters {
-            points_per_mean: self.points_per_mean(),
-            noise_ratios: ratios(&self.models),
-            flat_noise_ratios: ratios(&self.stiff),
-            quartic_noise_ratios: ratios(&self.quartic),
+            noise_ratios: ratios(&self.finest.models),
+            flat_noise_ratios: ratios(&self.finest.stiff),
+            quartic_noise_ratios: ratios(&self.finest.quartic),
+            coarser: self.coarser.iter().map(of_level).collect(),
             noise: self.noise,
+            bend_noise: self.finest.bend_noise,
             kernel: self.kernel,
         }
     }
 
     /// Returns the most points of which regressions see the mean, 1 where they see the points themselves.
     pub fn points_per_mean(&self) -> usize {
-        self.support.points_per_mean()
+        self.coarser.last().map_or(1, |coarsest| coarsest.level.support.points_per_mean())
     }
 
     /// σ: standard deviation of the noise of the points across the surface, unit L.
@@ -144,9 +174,14 @@ impl Patches {
 
     /// Bytes held on the heap besides the cloud and its sampling.
     pub fn n_bytes(&self) -> usize {
-        self.support.n_bytes()
-            + [&self.models, &self.stiff, &self.quartic].map(vec_bytes).iter().sum::<usize>()
+        let of_level = |of: &Coarser| of.level.n_bytes() + of.agreement.n_bytes();
+        self.finest.n_bytes() + vec_bytes(&self.coarser) + self.coarser.iter().map(of_level).sum::<usize>()
     }
+}
+
+fn ratios(models: &[Weighted]) -> Vec<NoiseRatio> {
+    let ratio = |of: &Weighted| NoiseRatio { ratio: of.model.noise, log_share: of.log_share };
+    models.iter().map(ratio).collect()
 }
 
 /// Returns the most points, or means, that a regression sees.
@@ -174,7 +209,7 @@ mod tests {
             let cloud = Arc::new(Cloud::new(on_sphere.collect(), dimension).unwrap());
             let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
             let patches = Patches::of(cloud.clone(), sampling, &Unobserved).unwrap();
-            assert_eq!(patches.count > 0, has_answers, "d = {dimension}");
+            assert_eq!(patches.finest.count > 0, has_answers, "d = {dimension}");
             let found = patches.at(&cloud, &|_| true, true, &Unobserved).unwrap();
             assert_eq!(found.is_known.contains(&true), has_answers, "d = {dimension}");
         }

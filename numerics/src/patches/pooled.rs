@@ -91,6 +91,17 @@ impl Kind {
 /// (nonparametric maximum likelihood: Laird 1978).
 pub(crate) fn pool(kind: Kind, candidates: &[Model], log_likelihoods: &[Vec<f64>]) -> Vec<Weighted> {
     let (n, least_share) = (candidates.len(), kind.least_share());
+    let shares = mixture_shares(n, log_likelihoods);
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|&a, &b| shares[b].total_cmp(&shares[a]));
+    let kept = order.into_iter().enumerate().filter(|&(rank, at)| rank == 0 || shares[at] > least_share);
+    let kept = kept.take(MAX_MODELS).map(|(_, at)| at);
+    kept.map(|at| Weighted { model: candidates[at], log_share: shares[at].ln() }).collect()
+}
+
+/// Returns the shares of `n` components that make a sample most likely: expectation and maximization
+/// (nonparametric maximum likelihood: Laird 1978). `log_likelihoods` is `[sample][n]`.
+pub(super) fn mixture_shares(n: usize, log_likelihoods: &[Vec<f64>]) -> Vec<f64> {
     let mut shares = vec![1.0 / n as f64; n];
     for _ in 0..STEPS {
         let mut sums = vec![0.0; n];
@@ -106,11 +117,7 @@ pub(crate) fn pool(kind: Kind, candidates: &[Model], log_likelihoods: &[Vec<f64>
         }
         shares = sums.iter().map(|sum| sum / total).collect();
     }
-    let mut order: Vec<usize> = (0..n).collect();
-    order.sort_by(|&a, &b| shares[b].total_cmp(&shares[a]));
-    let kept = order.into_iter().enumerate().filter(|&(rank, at)| rank == 0 || shares[at] > least_share);
-    let kept = kept.take(MAX_MODELS).map(|(_, at)| at);
-    kept.map(|at| Weighted { model: candidates[at], log_share: shares[at].ln() }).collect()
+    shares
 }
 
 /// Returns probabilities from their logarithms up to a constant. Entries that are not finite have probability

@@ -2,15 +2,19 @@
 
 use super::MAX_LOCAL_DIMENSION;
 
+/// Levels at which a query is regressed: one where points are exact, two to four where they have noise.
+const LEVELS: f64 = 1.7;
+
 /// Flops of a local regression at one query by all models of the mixture. Dimensions without local
 /// regressions take none.
 pub(crate) fn regression_flops(dimension: usize) -> f64 {
-    match dimension {
+    let at_one_level = match dimension {
         ..=2 => 2e5,
         3 => 3e5,
         MAX_LOCAL_DIMENSION => 3e6,
         _ => 0.0,
-    }
+    };
+    LEVELS * at_one_level
 }
 
 /// Regressions that choosing neighbourhoods and hyperparameters takes in large clouds. Small clouds take

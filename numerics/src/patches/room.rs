@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::Patches;
+use super::level::Level;
 use super::neighbourhood::{Neighbourhood, Scratch};
 use super::regression::{Batch, Krige, Kriged, Model, workspace};
 use crate::error::Result;
@@ -26,7 +26,7 @@ pub(super) enum Purpose {
 
 /// Buffers that a thread reuses from one batch to the next.
 pub(super) struct Room<'a> {
-    patches: &'a Patches,
+    level: &'a Level,
     walk: Walk<'a>,
     batch: Batch,
     workspace: Workspace,
@@ -40,14 +40,14 @@ pub(super) struct Room<'a> {
 }
 
 impl<'a> Room<'a> {
-    pub(super) fn new(patches: &'a Patches, lanes: usize) -> Self {
-        let (dimension, count) = (patches.support.cloud().dimension(), patches.count);
+    pub(super) fn new(level: &'a Level, lanes: usize) -> Self {
+        let (dimension, count) = (level.support.cloud().dimension(), level.count);
         Self {
-            patches,
-            walk: Walk::over(patches.support.neighbours()),
+            level,
+            walk: Walk::over(level.support.neighbours()),
             batch: Batch::new(dimension, count, lanes),
             workspace: workspace(dimension, count),
-            scratch: Scratch::default(),
+            scratch: Scratch { noise: level.bend_noise, ..Scratch::default() },
             nearest: Vec::new(),
             set: InstructionSet::best(),
             is_empty: true,
@@ -61,11 +61,11 @@ impl<'a> Room<'a> {
 
     /// Fills the lanes with the neighbourhoods of a range of queries.
     pub(super) fn put(&mut self, queries: &Cloud, range: Range<usize>) -> Vec<Option<Neighbourhood>> {
-        let support = &self.patches.support;
+        let support = &self.level.support;
         let mut places = Vec::with_capacity(range.len());
         for (lane, query) in range.enumerate() {
             let x = queries.point(query);
-            self.walk.points_into(x, self.patches.count, &mut self.nearest);
+            self.walk.points_into(x, self.level.count, &mut self.nearest);
             let place =
                 Neighbourhood::put(support, x, &mut self.nearest, &mut self.batch, lane, &mut self.scratch);
             if place.is_none() {
@@ -101,7 +101,7 @@ impl<'a> Room<'a> {
     }
 }
 
-impl Patches {
+impl Level {
     /// Solves each query for the given models. A query without a neighbourhood gives `None`.
     pub(super) fn krige_each(
         &self,

@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod carved;
 mod exact;
 mod jet;
 mod machined;

@@ -19,6 +19,8 @@ pub enum Shape {
     Pebble,
     /// A wave over a square. The surface is open and has a rim.
     Wave,
+    /// A sphere with carved detail, deeper and deeper towards one pole: waves of a length of 0.31.
+    Carved,
 }
 
 pub const SHAPES: [Shape; 6] =
@@ -57,6 +59,10 @@ impl Shape {
             }
             Self::Pebble => sum_of_squares(x, 1.0 / 0.85 * y, 1.0 / 0.55 * z) + -1.0,
             Self::Wave => z - 0.3 * ((2.0 * x).sin() * (2.0 * y + std::f64::consts::FRAC_PI_2).sin()),
+            Self::Carved => {
+                let depth = 0.02 * (z + 1.0);
+                sum_of_squares(x, y, z) + -1.0 + depth * ((20.0 * x).sin() * (20.0 * y).sin())
+            }
             Self::Cyclide => cyclide(1.6 * x, 1.6 * y, 1.6 * z),
             Self::Superellipsoid => {
                 let fourth = |x: Jet| x.squared().squared();
@@ -83,6 +89,7 @@ impl Shape {
             Self::RoundedCube => [1.01; 3],
             Self::Pebble => [1.01, 0.86, 0.56],
             Self::Wave => [1.0, 1.0, 0.31],
+            Self::Carved => [1.05; 3],
         }
     }
 

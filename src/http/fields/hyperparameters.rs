@@ -4,7 +4,10 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::http::problem::Problem;
-use gramian_numerics::patches::{self, MAX_MODELS, PatchHyperparameters, PatchKernel};
+use gramian_numerics::patches::{
+    self, Agreement, CoarserHyperparameters, MAX_COARSER, MAX_MODELS, N_BIASES, PatchHyperparameters,
+    PatchKernel,
+};
 use gramian_numerics::surface::local::SurfaceHyperparameters;
 
 /// What local regressions learned of a cloud.
@@ -13,9 +16,6 @@ use gramian_numerics::surface::local::SurfaceHyperparameters;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Hyperparameters {
-    /// Most points that a regression averages before it sees them. 1 where it sees the points themselves.
-    #[schema(minimum = 1)]
-    pub points_per_mean: usize,
     /// Mixture of noise ratios. Empty where nothing can be regressed.
     #[schema(max_items = 6)]
     pub noise_ratios: Vec<NoiseRatio>,
@@ -27,9 +27,19 @@ pub struct Hyperparameters {
     #[serde(default)]
     #[schema(max_items = 6)]
     pub quartic_noise_ratios: Vec<NoiseRatio>,
+    /// Regressions over means of points, which are weighed with those over points at each place. Ascending by
+    /// the points of a mean. Empty where points have no noise, or means are no surer.
+    #[serde(default)]
+    #[schema(max_items = 6)]
+    pub means: Vec<MeansLevel>,
     /// Standard deviation of the noise of the points across the surface, length.
     #[schema(minimum = 0.0)]
     pub noise_deviation: f64,
+    /// The same, or 0 where it may be bends of a coarsely sampled surface, length. Neighbourhoods do not take
+    /// it for a bend.
+    #[serde(default)]
+    #[schema(minimum = 0.0)]
+    pub bend_noise_deviation: f64,
     /// Length scale of the heights of the surface over its tangent planes.
     #[schema(minimum = 0.0)]
     pub length_scale: f64,
@@ -44,6 +54,28 @@ pub struct Hyperparameters {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 0.0)]
     pub least_ratio: Option<f64>,
+}
+
+/// What local regressions over means of points learned.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MeansLevel {
+    /// Most points of a mean.
+    #[schema(minimum = 2)]
+    pub points_per_mean: usize,
+    /// Mixture of noise ratios.
+    #[schema(max_items = 6)]
+    pub noise_ratios: Vec<NoiseRatio>,
+    /// Mixture of noise ratios for normals where the surface is flat.
+    #[schema(max_items = 6)]
+    pub flat_noise_ratios: Vec<NoiseRatio>,
+    /// Shares of the places at which normals are off those over fewer points by 0, 0.1, 0.3, 1, 3, 10, 30,
+    /// 100 and 1,000 times the variance that noise explains.
+    #[schema(max_items = 9)]
+    pub normal_bias_shares: Vec<f64>,
+    /// The same of curvatures.
+    #[schema(max_items = 9)]
+    pub curvature_bias_shares: Vec<f64>,
 }
 
 /// A ratio of the variance of the noise to that of the heights, and how common it is.
@@ -62,15 +94,13 @@ impl Hyperparameters {
     /// Reports what a surface learned, or was given.
     pub fn of(learned: &SurfaceHyperparameters) -> Self {
         let SurfaceHyperparameters { regression, radius, least_ratio } = learned;
-        let ratios = |of: &[patches::NoiseRatio]| {
-            of.iter().map(|of| NoiseRatio { ratio: of.ratio, log_share: of.log_share }).collect()
-        };
         Self {
-            points_per_mean: regression.points_per_mean,
-            noise_ratios: ratios(&regression.noise_ratios),
-            flat_noise_ratios: ratios(&regression.flat_noise_ratios),
-            quartic_noise_ratios: ratios(&regression.quartic_noise_ratios),
+            noise_ratios: reported(&regression.noise_ratios),
+            flat_noise_ratios: reported(&regression.flat_noise_ratios),
+            quartic_noise_ratios: reported(&regression.quartic_noise_ratios),
+            means: regression.coarser.iter().map(MeansLevel::of).collect(),
             noise_deviation: regression.noise,
+            bend_noise_deviation: regression.bend_noise,
             length_scale: regression.kernel.length_scale,
             variance: regression.kernel.variance,
             radius: *radius,
@@ -86,11 +116,9 @@ impl Hyperparameters {
         let refuse = |member: &str, requirement: &str| {
             Err(Problem::invalid_request(format!("/hyperparameters/{member}"), requirement))
         };
-        if self.points_per_mean == 0 {
-            return refuse("points_per_mean", "a mean has 1 point or more");
-        }
         for (member, number) in [
             ("noise_deviation", self.noise_deviation),
+            ("bend_noise_deviation", self.bend_noise_deviation),
             ("length_scale", self.length_scale),
             ("variance", self.variance),
             ("least_ratio", self.least_ratio.unwrap_or_default()),
@@ -103,16 +131,69 @@ impl Hyperparameters {
             return refuse("radius", "must be more than 0");
         }
         let regression = PatchHyperparameters {
-            points_per_mean: self.points_per_mean,
             noise_ratios: ratios(&self.noise_ratios, "noise_ratios")?,
             flat_noise_ratios: ratios(&self.flat_noise_ratios, "flat_noise_ratios")?,
             quartic_noise_ratios: ratios(&self.quartic_noise_ratios, "quartic_noise_ratios")?,
+            coarser: levels(&self.means)?,
             noise: self.noise_deviation,
+            bend_noise: self.bend_noise_deviation,
             kernel: PatchKernel { length_scale: self.length_scale, variance: self.variance },
         };
         let least_ratio = self.least_ratio.unwrap_or(f64::INFINITY);
         Ok(SurfaceHyperparameters { regression, radius: self.radius, least_ratio })
     }
+}
+
+impl MeansLevel {
+    fn of(learned: &CoarserHyperparameters) -> Self {
+        Self {
+            points_per_mean: learned.points_per_mean,
+            noise_ratios: reported(&learned.noise_ratios),
+            flat_noise_ratios: reported(&learned.flat_noise_ratios),
+            normal_bias_shares: learned.agreement.normals.clone(),
+            curvature_bias_shares: learned.agreement.curvatures.clone(),
+        }
+    }
+
+    /// Checks the level number `at`, whose means have `least` points or more.
+    fn checked(&self, at: usize, least: usize) -> Result<CoarserHyperparameters, Problem> {
+        let member = |name: &str| format!("means/{at}/{name}");
+        if self.points_per_mean < least {
+            return Err(refusal(&member("points_per_mean"), &format!("must be {least} or more")));
+        }
+        Ok(CoarserHyperparameters {
+            points_per_mean: self.points_per_mean,
+            noise_ratios: ratios(&self.noise_ratios, &member("noise_ratios"))?,
+            flat_noise_ratios: ratios(&self.flat_noise_ratios, &member("flat_noise_ratios"))?,
+            agreement: Agreement {
+                normals: checked_shares(&self.normal_bias_shares, &member("normal_bias_shares"))?,
+                curvatures: checked_shares(&self.curvature_bias_shares, &member("curvature_bias_shares"))?,
+            },
+        })
+    }
+}
+
+fn checked_shares(given: &[f64], member: &str) -> Result<Vec<f64>, Problem> {
+    if given.len() != N_BIASES || given.iter().any(|share| !(0.0..=1.0).contains(share)) {
+        return Err(refusal(member, &format!("must be {N_BIASES} shares from 0 to 1")));
+    }
+    Ok(given.to_vec())
+}
+
+fn reported(of: &[patches::NoiseRatio]) -> Vec<NoiseRatio> {
+    of.iter().map(|of| NoiseRatio { ratio: of.ratio, log_share: of.log_share }).collect()
+}
+
+fn levels(given: &[MeansLevel]) -> Result<Vec<CoarserHyperparameters>, Problem> {
+    if given.len() > MAX_COARSER {
+        return Err(refusal("means", &format!("at most {MAX_COARSER} levels of means")));
+    }
+    let least = |at: usize| if at == 0 { 2 } else { given[at - 1].points_per_mean.saturating_add(1) };
+    given.iter().enumerate().map(|(at, level)| level.checked(at, least(at))).collect()
+}
+
+fn refusal(member: &str, requirement: &str) -> Problem {
+    Problem::invalid_request(format!("/hyperparameters/{member}"), requirement)
 }
 
 fn ratios(given: &[NoiseRatio], member: &str) -> Result<Vec<patches::NoiseRatio>, Problem> {

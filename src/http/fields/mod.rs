@@ -21,5 +21,5 @@ pub use diagnostics::{
 };
 pub(crate) use fit::request;
 pub use fit::{Fit, Geometry, GivenProcess, HasCloud};
-pub use hyperparameters::{Hyperparameters, NoiseRatio};
+pub use hyperparameters::{Hyperparameters, MeansLevel, NoiseRatio};
 pub use kernel::{Kernel, KernelFamily, KernelUsed};

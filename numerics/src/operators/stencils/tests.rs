@@ -113,8 +113,9 @@ fn stretched_grids_and_near_duplicates_have_right_rows() {
         let found = laplacian.matrix.apply(&values);
         let is_resolved = |i: usize| laplacian.resolutions[i] == Resolution::Resolved;
         for i in (0..2000).filter(|&i| is_resolved(i)) {
-            // At most the jitter over the square of the spacing, 0.1.
-            assert!((found[i] + 2.0 * values[i]).abs() < 0.15, "{jitter} {i}: {} {}", found[i], values[i]);
+            // The jitter over the square of the spacing, 0.1, and at single places as much again: twins are
+            // off by more there than regressions over the points say.
+            assert!((found[i] + 2.0 * values[i]).abs() < 0.2, "{jitter} {i}: {} {}", found[i], values[i]);
         }
         assert!((0..2000).filter(|&i| is_resolved(i)).count() > 1900, "{jitter}");
     }

@@ -8,6 +8,10 @@ use crate::machine::vector::{dot, norm, tangent_basis};
 use crate::points::neighbours::Neighbour;
 use crate::points::patch::is_at_rim;
 
+/// Greatest standard error of the bend of the first points, by the noise of the cloud. With a larger one more
+/// points are taken: the frame would be turned by chance.
+const MOST_DOUBT: f64 = 0.5;
+
 /// A growing neighbourhood in D dimensions with P terms of the trend.
 pub(super) struct Grown<const D: usize, const P: usize> {
     /// Number of points in use: the first ones of the scratch.
@@ -72,16 +76,32 @@ impl<const D: usize, const P: usize> Grown<D, P> {
             frame.as_flattened_mut()[..D * (D - 1)].copy_from_slice(&tangent_basis(&sheet.normal));
             frame[D - 1] = sheet.normal;
         }
-        let radius = nearest[n_used - 1].squared_distance.sqrt();
         let mut grown = Self { n_used, radius, frame, quadric: [0.0; P] };
-        grown.look(support, nearest, scratch);
-        let mut sums = Sums::<P>::default();
-        for (at, found) in nearest[..n_used].iter().enumerate() {
-            sums.add(scratch.terms_at(at), scratch.heights[at], support.count(found.point));
+        while grown.fit(support, nearest, scratch)? > MOST_DOUBT && grown.n_used < nearest.len() {
+            grown.n_used = (2 * grown.n_used).min(nearest.len());
+            if sheet.is_none() {
+                let radius = nearest[grown.n_used - 1].squared_distance.sqrt();
+                let axes = principal_axes(&scratch.arms[..grown.n_used * D], D, radius);
+                grown.frame.as_flattened_mut().copy_from_slice(&axes);
+            }
         }
-        grown.quadric = sums.fit()?.0;
         grown.turn();
         Some((grown, sheet.map(|sheet| sheet.reach)))
+    }
+
+    /// Fits the quadric to the points in use. Returns the standard error of its bend by the noise of the
+    /// cloud.
+    fn fit(&mut self, support: &Support, nearest: &[Neighbour], scratch: &mut Scratch) -> Option<f64> {
+        self.radius = nearest[self.n_used - 1].squared_distance.sqrt();
+        self.look(support, nearest, scratch);
+        let mut sums = Sums::<P>::default();
+        for (at, found) in nearest[..self.n_used].iter().enumerate() {
+            sums.add(scratch.terms_at(at), scratch.heights[at], support.count(found.point));
+        }
+        let fit = sums.fit()?;
+        self.quadric = fit.quadric;
+        let noise = scratch.noise / self.radius;
+        Some(if noise > 0.0 { noise * fit.unit_error::<D>() } else { 0.0 })
     }
 
     /// Takes in more points while the surface known so far bends little over them. Points of other sheets are
@@ -96,13 +116,14 @@ impl<const D: usize, const P: usize> Grown<D, P> {
         let unit = nearest.iter().fold(0.0, |unit: f64, found| unit.max(found.squared_distance)).sqrt();
         (self.n_used, self.radius) = (nearest.len(), unit);
         self.look(support, nearest, scratch);
-        let mut growth = Growth::<D, P>::up_to(reach.map_or(f64::INFINITY, |reach| reach / unit));
+        let mut growth =
+            Growth::<D, P>::up_to(reach.map_or(f64::INFINITY, |reach| reach / unit), scratch.noise / unit);
         for count in [P + 3, 8 * P / 3, 4 * P, 5 * P, 6 * P, nearest.len()] {
             if growth.take(count.min(nearest.len()), unit, support, nearest, scratch).is_none() {
                 break;
             }
         }
-        self.quadric = growth.quadric;
+        self.quadric = growth.quadric();
         self.turn();
         let kept = growth.keep(nearest, &mut scratch.arms);
         (self.n_used, self.radius) = (kept, nearest[kept - 1].squared_distance.sqrt());

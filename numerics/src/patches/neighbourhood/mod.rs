@@ -39,6 +39,8 @@ pub(crate) struct Neighbourhood {
 /// Buffers for the points of one neighbourhood.
 #[derive(Default)]
 pub(crate) struct Scratch {
+    /// σ: standard deviation of the noise of a point, as far as the whole cloud tells, unit L.
+    pub noise: f64,
     /// Differences x_j − x, `[count, d]`, unit L.
     pub(super) arms: Vec<f64>,
     /// Terms of the trend in units of the current radius: 1, the tangential coordinates and their products,

@@ -16,6 +16,16 @@ pub(super) struct Sums<const P: usize> {
     n: f64,
 }
 
+/// A quadric fitted to heights.
+#[derive(Clone, Copy)]
+pub(super) struct Fit<const P: usize> {
+    pub(super) quadric: [f64; P],
+    /// Sum of squared residuals, in which each mean counts once.
+    pub(super) residuals: f64,
+    /// R of the normal equations RᵀR, in the upper triangle.
+    factor: [[f64; P]; P],
+}
+
 impl<const P: usize> Default for Sums<P> {
     fn default() -> Self {
         Self { matrix: [[0.0; P]; P], right: [0.0; P], squares: 0.0, weight: 0.0, n: 0.0 }
@@ -32,15 +42,37 @@ impl<const P: usize> Sums<P> {
         self.n += 1.0;
     }
 
-    /// Returns the quadric and the sum of squared residuals, in which each mean counts once. Returns `None`
-    /// if the points do not determine a quadric.
-    pub(super) fn fit(&self) -> Option<([f64; P], f64)> {
+    /// Fits the quadric. Returns `None` if the points do not determine one.
+    pub(super) fn fit(&self) -> Option<Fit<P>> {
         let (mut matrix, mut right) = (self.matrix, self.right);
         factorize(&mut matrix)?;
         forward(&matrix, &mut right);
         let explained: f64 = right.iter().map(|r| r * r).sum();
         backward(&matrix, &mut right);
-        Some((right, (self.squares - explained).max(0.0) * self.n / self.weight))
+        let residuals = (self.squares - explained).max(0.0) * self.n / self.weight;
+        Some(Fit { quadric: right, residuals, factor: matrix })
+    }
+}
+
+impl<const P: usize> Fit<P> {
+    /// Returns the standard error of the height at a place with these terms if a point has unit noise.
+    pub(super) fn height_error(&self, terms: &[f64; P]) -> f64 {
+        let mut column = *terms;
+        forward(&self.factor, &mut column);
+        column.iter().map(|c| c * c).sum::<f64>().sqrt()
+    }
+
+    /// Returns the standard error of the second derivatives together, as a matrix, if a point has unit noise.
+    /// It does not depend on the axes.
+    pub(super) fn unit_error<const D: usize>(&self) -> f64 {
+        let variance = |at: usize| {
+            let mut column = [0.0; P];
+            column[at] = 1.0;
+            forward(&self.factor, &mut column);
+            column.iter().map(|c| c * c).sum::<f64>()
+        };
+        let entries = second_derivatives(D - 1).enumerate();
+        entries.map(|(at, (a, b))| if a == b { 1.0 } else { 2.0 } * variance(D + at)).sum::<f64>().sqrt()
     }
 }
 

@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from .link import Link
     from .matrix_format import MatrixFormat
     from .mean_choice import MeanChoice
+    from .means_level import MeansLevel
     from .mesh_bounds import MeshBounds
     from .mesh_include import MeshInclude
     from .mesh_part import MeshPart
@@ -157,6 +158,7 @@ __all__ = (
     "Link",
     "MatrixFormat",
     "MeanChoice",
+    "MeansLevel",
     "MeshBounds",
     "MeshInclude",
     "MeshPart",
@@ -255,6 +257,7 @@ if not TYPE_CHECKING:
         "Link": ".link",
         "MatrixFormat": ".matrix_format",
         "MeanChoice": ".mean_choice",
+        "MeansLevel": ".means_level",
         "MeshBounds": ".mesh_bounds",
         "MeshInclude": ".mesh_include",
         "MeshPart": ".mesh_part",

@@ -8,6 +8,7 @@ from attrs import define as _attrs_define
 from ..types import UNSET, Unset, without_unset
 
 if TYPE_CHECKING:
+    from ..models.means_level import MeansLevel
     from ..models.noise_ratio import NoiseRatio
 
 
@@ -21,8 +22,6 @@ class Hyperparameters:
     Sent as `hyperparameters` of a request about a part of the cloud, they are used as they are.
 
         Attributes:
-            points_per_mean (int): Most points that a regression averages before it sees them. 1 where it sees the points
-                themselves.
             noise_ratios (list[NoiseRatio]): Mixture of noise ratios. Empty where nothing can be regressed.
             flat_noise_ratios (list[NoiseRatio]): Mixture of noise ratios for normals where the surface is flat. Empty where
                 there is no noise.
@@ -34,12 +33,17 @@ class Hyperparameters:
             quartic_noise_ratios (list[NoiseRatio] | Unset): Mixture of noise ratios beside polynomials of fourth order.
                 Empty where points have noise, or quadrics
                 are as sure.
+            means (list[MeansLevel] | Unset): Regressions over means of points, which are weighed with those over points at
+                each place. Ascending by
+                the points of a mean. Empty where points have no noise, or means are no surer.
+            bend_noise_deviation (float | Unset): The same, or 0 where it may be bends of a coarsely sampled surface,
+                length. Neighbourhoods do not take
+                it for a bend.
             least_ratio (float | Unset): Least ratio of a curvature to its deviation at which the curvature counts as known.
                 Absent if none
                 is known.
     """
 
-    points_per_mean: int
     noise_ratios: list[NoiseRatio]
     flat_noise_ratios: list[NoiseRatio]
     noise_deviation: float
@@ -47,13 +51,13 @@ class Hyperparameters:
     variance: float
     radius: float
     quartic_noise_ratios: list[NoiseRatio] | Unset = UNSET
+    means: list[MeansLevel] | Unset = UNSET
+    bend_noise_deviation: float | Unset = UNSET
     least_ratio: float | Unset = UNSET
 
     __repr__ = without_unset
 
     def to_dict(self) -> dict[str, Any]:
-        points_per_mean = self.points_per_mean
-
         noise_ratios = []
         for noise_ratios_item_data in self.noise_ratios:
             noise_ratios_item = noise_ratios_item_data.to_dict()
@@ -79,13 +83,21 @@ class Hyperparameters:
                 quartic_noise_ratios_item = quartic_noise_ratios_item_data.to_dict()
                 quartic_noise_ratios.append(quartic_noise_ratios_item)
 
+        means: list[dict[str, Any]] | Unset = UNSET
+        if not isinstance(self.means, Unset):
+            means = []
+            for means_item_data in self.means:
+                means_item = means_item_data.to_dict()
+                means.append(means_item)
+
+        bend_noise_deviation = self.bend_noise_deviation
+
         least_ratio = self.least_ratio
 
         field_dict: dict[str, Any] = {}
 
         field_dict.update(
             {
-                "points_per_mean": points_per_mean,
                 "noise_ratios": noise_ratios,
                 "flat_noise_ratios": flat_noise_ratios,
                 "noise_deviation": noise_deviation,
@@ -96,6 +108,10 @@ class Hyperparameters:
         )
         if quartic_noise_ratios is not UNSET:
             field_dict["quartic_noise_ratios"] = quartic_noise_ratios
+        if means is not UNSET:
+            field_dict["means"] = means
+        if bend_noise_deviation is not UNSET:
+            field_dict["bend_noise_deviation"] = bend_noise_deviation
         if least_ratio is not UNSET:
             field_dict["least_ratio"] = least_ratio
 
@@ -103,11 +119,10 @@ class Hyperparameters:
 
     @classmethod
     def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
+        from ..models.means_level import MeansLevel
         from ..models.noise_ratio import NoiseRatio
 
         d = dict(src_dict)
-        points_per_mean = d.pop("points_per_mean")
-
         noise_ratios = []
         _noise_ratios = d.pop("noise_ratios")
         for noise_ratios_item_data in _noise_ratios:
@@ -139,10 +154,20 @@ class Hyperparameters:
 
                 quartic_noise_ratios.append(quartic_noise_ratios_item)
 
+        _means = d.pop("means", UNSET)
+        means: list[MeansLevel] | Unset = UNSET
+        if _means is not UNSET:
+            means = []
+            for means_item_data in _means:
+                means_item = MeansLevel.from_dict(means_item_data)
+
+                means.append(means_item)
+
+        bend_noise_deviation = d.pop("bend_noise_deviation", UNSET)
+
         least_ratio = d.pop("least_ratio", UNSET)
 
         hyperparameters = cls(
-            points_per_mean=points_per_mean,
             noise_ratios=noise_ratios,
             flat_noise_ratios=flat_noise_ratios,
             noise_deviation=noise_deviation,
@@ -150,6 +175,8 @@ class Hyperparameters:
             variance=variance,
             radius=radius,
             quartic_noise_ratios=quartic_noise_ratios,
+            means=means,
+            bend_noise_deviation=bend_noise_deviation,
             least_ratio=least_ratio,
         )
 

@@ -24,6 +24,7 @@ class MeshPart:
         n_boundary_edges (int): Number of edges (in the plane: ends) that belong to a single cell. 0 if the part is
             closed.
         area (float): The area in the square of the unit of the points, or the length of a curve.
+        n_far_vertices (int): Number of its vertices that are farther than three spacings from all points.
     """
 
     n_vertices: int
@@ -31,6 +32,7 @@ class MeshPart:
     euler_characteristic: int
     n_boundary_edges: int
     area: float
+    n_far_vertices: int
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
     __repr__ = without_unset
@@ -46,6 +48,8 @@ class MeshPart:
 
         area = self.area
 
+        n_far_vertices = self.n_far_vertices
+
         field_dict: dict[str, Any] = {}
         field_dict.update(self.additional_properties)
         field_dict.update(
@@ -55,6 +59,7 @@ class MeshPart:
                 "euler_characteristic": euler_characteristic,
                 "n_boundary_edges": n_boundary_edges,
                 "area": area,
+                "n_far_vertices": n_far_vertices,
             }
         )
 
@@ -73,12 +78,15 @@ class MeshPart:
 
         area = d.pop("area")
 
+        n_far_vertices = d.pop("n_far_vertices")
+
         mesh_part = cls(
             n_vertices=n_vertices,
             n_cells=n_cells,
             euler_characteristic=euler_characteristic,
             n_boundary_edges=n_boundary_edges,
             area=area,
+            n_far_vertices=n_far_vertices,
         )
 
         mesh_part.additional_properties = d

@@ -6,6 +6,7 @@ class WarningCode(StrEnum):
     DISAGREES_WITH_NEIGHBOURS = "disagrees_with_neighbours"
     DUPLICATES_MERGED = "duplicates_merged"
     FAR_FROM_CLOUD = "far_from_cloud"
+    FAR_VERTICES = "far_vertices"
     ILL_CONDITIONED = "ill_conditioned"
     KERNEL_TOO_ROUGH = "kernel_too_rough"
     MISFIT = "misfit"
@@ -17,6 +18,7 @@ class WarningCode(StrEnum):
     RAW_MESH = "raw_mesh"
     REFINED = "refined"
     REPEATED_ROWS = "repeated_rows"
+    UNITS_DIFFER = "units_differ"
     VARIANCE_CLAMPED = "variance_clamped"
 
     def __str__(self) -> str:
