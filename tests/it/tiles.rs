@@ -52,7 +52,7 @@ async fn hyperparameters_out_of_range_are_refused_by_their_place() {
     let ratio = |ratio: f64, log_share: f64| json!({"ratio": ratio, "log_share": log_share});
     let cases = [
         (with("means", json!([level(1, 9)])), "means/0/points_per_mean"),
-        (with("means", json!([level(8, 9), level(8, 9)])), "means/1/points_per_mean"),
+        (with("means", json!([level(8, 9), level(15, 9)])), "means/1/points_per_mean"),
         (with("means", json!([level(8, 8)])), "means/0/normal_bias_shares"),
         (with("means", json!(vec![level(8, 9); 7])), "means"),
         (with("noise_deviation", json!(-1.0)), "noise_deviation"),

@@ -187,7 +187,7 @@ impl Patches {
         with_deviations: bool,
         observer: &dyn Observer,
     ) -> Result<PatchGeometry> {
-        // What coarser levels are worth, curvatures decide too.
+        // Levels are weighed by curvatures as well, which come with deviations only.
         let with_deviations = with_deviations || !self.coarser.is_empty();
         let mut geometry = self.finest.at(queries, is_point, with_deviations, observer)?;
         for Coarser { level, agreement } in &self.coarser {

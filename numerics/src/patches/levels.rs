@@ -37,7 +37,7 @@ pub struct Agreement {
     pub curvatures: Vec<f64>,
 }
 
-/// What a fine and a coarse level say of one quantity at one place.
+/// Difference of a fine and a coarse level in one quantity at one place.
 #[derive(Clone, Copy)]
 struct Said {
     /// |a − c|², over the variance of one of its components without a bias.
@@ -272,7 +272,7 @@ mod tests {
         let mut random = Random::of(2, 0);
         let fine = drawn(&mut random, 0.1);
         let mut coarse = drawn(&mut random, 0.02);
-        // One place of four has a detail that the coarser level does not see.
+        // The coarser level misses a detail at every fourth place.
         coarse.iter_mut().step_by(4).for_each(|angle| *angle += 1.0);
         let (found, _) = refined(&fine, &coarse);
         let (share, _) = covered(&found);

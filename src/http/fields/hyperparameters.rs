@@ -27,8 +27,9 @@ pub struct Hyperparameters {
     #[serde(default)]
     #[schema(max_items = 6)]
     pub quartic_noise_ratios: Vec<NoiseRatio>,
-    /// Regressions over means of points, which are weighed with those over points at each place. Ascending by
-    /// the points of a mean. Empty where points have no noise, or means are no surer.
+    /// Regressions over means of points, which are weighed with those over points at each place. Each
+    /// level has twice as many points a mean as the one before, or more. Empty where points have no noise, or
+    /// means are no surer.
     #[serde(default)]
     #[schema(max_items = 6)]
     pub means: Vec<MeansLevel>,
@@ -188,7 +189,7 @@ fn levels(given: &[MeansLevel]) -> Result<Vec<CoarserHyperparameters>, Problem> 
     if given.len() > MAX_COARSER {
         return Err(refusal("means", &format!("at most {MAX_COARSER} levels of means")));
     }
-    let least = |at: usize| if at == 0 { 2 } else { given[at - 1].points_per_mean.saturating_add(1) };
+    let least = |at: usize| if at == 0 { 2 } else { given[at - 1].points_per_mean.saturating_mul(2) };
     given.iter().enumerate().map(|(at, level)| level.checked(at, least(at))).collect()
 }
 

@@ -34,8 +34,9 @@ class Hyperparameters:
                 Empty where points have noise, or quadrics
                 are as sure.
             means (list[MeansLevel] | Unset): Regressions over means of points, which are weighed with those over points at
-                each place. Ascending by
-                the points of a mean. Empty where points have no noise, or means are no surer.
+                each place. Each
+                level has twice as many points a mean as the one before, or more. Empty where points have no noise, or
+                means are no surer.
             bend_noise_deviation (float | Unset): The same, or 0 where it may be bends of a coarsely sampled surface,
                 length. Neighbourhoods do not take
                 it for a bend.
