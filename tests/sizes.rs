@@ -138,7 +138,9 @@ fn register(format: BodyFormat, body: Vec<u8>) -> usize {
 fn learning_takes_what_it_is_priced() {
     // The first run is not counted, because matrix products begin by reserving addresses for each thread.
     for (at, (n, d)) in
-        [(2000, 3), (300, 2), (2000, 3), (5000, 6), (20_000, 2), (20_000, 3)].into_iter().enumerate()
+        [(2000, 3), (300, 2), (2000, 3), (300, 6), (2000, 6), (5000, 6), (20_000, 2), (20_000, 3)]
+            .into_iter()
+            .enumerate()
     {
         let cloud = Cloud::new(numbers(n * d), d).unwrap();
         let values: Vec<f64> = cloud.points().map(|x| (3.0 * x[0]).sin() + x[1]).collect();
@@ -146,7 +148,7 @@ fn learning_takes_what_it_is_priced() {
         let (noise, mean) = (Noise::Unknown, Mean::Linear);
         let observed = Observed { cloud: &cloud, sampling: &sampling, values: &values, noise, mean };
         let (_, taken) = peak_of(|| learn(observed, &Unobserved).unwrap());
-        let priced = learning_price(n, d, 1).n_bytes;
+        let priced = learning_price(&cloud, 1).n_bytes;
         println!("learning from {n} values in {d} dimensions: {taken} bytes at the peak, priced {priced}");
         // Grids and scores take some kilobytes in both figures.
         let holds = taken <= priced + BASE_BYTES && priced <= 10 * (taken + BASE_BYTES);

@@ -10,7 +10,8 @@ use gramian_numerics::kernel::Family;
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::regression::selection::{
-    Criterion, Hyperparameters, MAX_EVALUATIONS, Observations, Parameter, Selection, Variation, select,
+    Criterion, Hyperparameters, MAX_EVALUATIONS, Observations, Parameter, ScalePrior, Selection, Variation,
+    select,
 };
 use gramian_numerics::regression::solver::trend::Mean;
 use gramian_numerics::regression::sums::regularization::Regularization;
@@ -55,6 +56,7 @@ fn main() {
         criterion: Criterion::MarginalLikelihood,
         start: &start,
         vary: &vary,
+        prior: ScalePrior::Flat,
         families: &[],
         restarts: restarts.parse().unwrap(),
         seed: 0,

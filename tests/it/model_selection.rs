@@ -264,3 +264,61 @@ async fn what_is_selected_is_served_when_it_is_sent_back() {
         }
     }
 }
+
+/// Rows of three columns in different units, of which the third does not matter.
+fn table(n: usize) -> Value {
+    let mut random = Random(n as u64 + 7);
+    let rows: Vec<[f64; 3]> = (0..n).map(|_| [0, 1, 2].map(|_| random.uniform())).collect();
+    let values: Vec<f64> =
+        rows.iter().map(|x| (6.0 * x[0]).sin() + 2.0 * x[1] + 0.1 * random.normal()).collect();
+    let points: Vec<[f64; 3]> = rows.iter().map(|x| [1e-3 * x[0], 1e3 * x[1], x[2]]).collect();
+    json!({"cloud": {"points": points}, "values": values, "restarts": 0})
+}
+
+#[tokio::test]
+async fn the_columns_of_a_table_start_with_length_scales_of_their_own() {
+    let server = Server::start().await;
+    let mut body = table(120);
+    let answer = server.post("/v1/model-selection", &body).await.expect_ok();
+    let scales = numbers(&answer["kernel"]["length_scales"]);
+    assert!(scales[0] < 0.01 && scales[1] > 100.0 && scales[2] > 0.5, "{scales:?}");
+    assert_eq!(answer["gradient"].as_array().unwrap().len(), 5);
+    let noise = answer["alpha"].as_f64().unwrap().sqrt();
+    assert!((0.07..0.14).contains(&noise), "{noise}");
+    // One length scale for all may be asked for all the same.
+    body["vary"] = json!([{"parameter": "length_scale", "min": 1e-3, "max": 1e3}]);
+    let answer = server.post("/v1/model-selection", &body).await.expect_ok();
+    assert!(answer["kernel"]["length_scale"].as_f64().unwrap() > 0.0);
+}
+
+#[tokio::test]
+async fn rows_that_repeat_count_once_where_noise_is_searched_for() {
+    let server = Server::start().await;
+    let kernel = json!({"family": "matern", "length_scale": 1.0});
+    let mut body = measured(120, 0.2);
+    (body["kernel"], body["alpha"], body["mean"]) = (kernel, json!(0.1), json!("constant"));
+    let plain = server.post("/v1/model-selection", &body).await.expect_ok();
+    for name in ["points", "values"] {
+        let rows = if name == "points" { &mut body["cloud"][name] } else { &mut body[name] };
+        let rows = rows.as_array_mut().unwrap();
+        rows.extend_from_within(10..50);
+    }
+    let answer = server.post("/v1/model-selection", &body).await.expect_ok();
+    let (a, b) = (plain["alpha"].as_f64().unwrap(), answer["alpha"].as_f64().unwrap());
+    assert!((a / b - 1.0).abs() < 1e-6, "{a} {b}");
+    let predictions = numbers(&answer["leave_one_out"]["means"]);
+    assert_eq!((predictions.len(), &predictions[120..]), (160, &predictions[10..50]));
+    let warnings = answer["diagnostics"]["warnings"].as_array().unwrap();
+    let repeated = warnings.iter().find(|warning| warning["code"] == "repeated_rows").unwrap();
+    assert!(repeated["detail"].as_str().unwrap().contains(": 40;"), "{repeated}");
+    // Without a kernel, rows that repeat are left out before the search.
+    body.as_object_mut().unwrap().retain(|name, _| name != "kernel" && name != "alpha");
+    let learned = server.post("/v1/model-selection", &body).await.expect_ok();
+    let noise = learned["alpha"].as_f64().unwrap().sqrt();
+    assert!((0.16..0.25).contains(&noise), "{noise}");
+    assert_eq!(numbers(&learned["leave_one_out"]["means"]).len(), 160);
+    // Noise that is given is that of measurements, which all count.
+    (body["alpha"], body["vary"]) = (json!(0.04), json!([]));
+    let given = server.post("/v1/model-selection", &body).await.expect_ok();
+    assert_eq!(given["diagnostics"]["warnings"], json!([]));
+}

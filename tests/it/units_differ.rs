@@ -25,7 +25,16 @@ async fn warned(server: &Server, body: &Value) -> Vec<String> {
 async fn coordinates_of_different_units_are_named_where_the_kernel_is_learned() {
     let server = Server::start().await;
     assert_eq!(warned(&server, &table(5.0)).await, Vec::<String>::new());
-    let found = warned(&server, &table(1000.0)).await;
+    // The values decide for a length scale of each coordinate.
+    let answer = server.post("/v1/interpolation", &table(1000.0)).await.expect_ok();
+    let scales = answer["diagnostics"]["kernel"]["length_scales"].as_array().unwrap().clone();
+    assert!(scales[1].as_f64().unwrap() > 100.0 * scales[0].as_f64().unwrap(), "{scales:?}");
+    assert_eq!(warned(&server, &table(1000.0)).await, Vec::<String>::new());
+    // Values that are noise decide for nothing.
+    let mut noise = table(1000.0);
+    let mut random = Random(4);
+    noise["values"] = (0..80).map(|_| random.uniform()).collect();
+    let found = warned(&server, &noise).await;
     assert!(found.len() == 1 && found[0].starts_with("coordinate 1 of the points varies"), "{found:?}");
     assert!(found[0].contains("as coordinate 0") && found[0].contains("length_scales"), "{found:?}");
     // A kernel that is given is a choice. A coordinate that does not vary has no unit.

@@ -44,16 +44,15 @@ impl ScaledProcess {
     /// # Errors
     /// `NumericsError::InvalidKernelParameter`, `NumericsError::InvalidRegularization`.
     pub fn learned(learned: &Learned, given: Option<Regularization>) -> Result<Self> {
-        let Learned { family, length_scale, ratio, variance, .. } = *learned;
-        let kernel = |variance| Kernel::new(family, length_scale, variance);
+        let Learned { ratio, variance, .. } = *learned;
         match given_or(given, ratio * variance)? {
             // A learned variance may leave the range of kernels, so it becomes the scale of a kernel of
             // variance 1.
             Regularization::Uniform(alpha) => {
                 let regularization = Regularization::uniform(alpha / variance)?;
-                Ok(Self { kernel: kernel(1.0)?, regularization, scale: variance })
+                Ok(Self { kernel: learned.kernel(1.0)?, regularization, scale: variance })
             }
-            regularization => Ok(Self { kernel: kernel(variance)?, regularization, scale: 1.0 }),
+            regularization => Ok(Self { kernel: learned.kernel(variance)?, regularization, scale: 1.0 }),
         }
     }
 

@@ -123,10 +123,12 @@ impl Judged<'_> {
     fn process(&self) -> Result<(Kernel, f64)> {
         let own = self.interpolant.solver.kernel();
         let Some(learned) = self.learned else { return Ok((own.clone(), self.factor)) };
+        let found = learned.kernel(1.0)?;
         let kernel = match own.length_scales() {
-            None => Kernel::new(learned.family, learned.length_scale, 1.0)?,
+            None => found,
             Some(axes) => {
-                let scaled = axes.iter().map(|axis| axis / own.length_scale() * learned.length_scale);
+                let of_axis = |axis: usize| found.length_scale() / found.stretch(axis);
+                let scaled = (0..axes.len()).map(|axis| axes[axis] / own.length_scale() * of_axis(axis));
                 Kernel::of_axes(learned.family, &scaled.collect::<Vec<f64>>(), 1.0)?
             }
         };

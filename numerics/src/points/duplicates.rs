@@ -72,6 +72,23 @@ pub(crate) fn coinciding_points(cloud: &Cloud, counts: impl Fn(usize) -> bool) -
     points
 }
 
+/// Returns the rows that repeat the position and the value, `[n]`, of an earlier one, ascending.
+pub fn row_copies(cloud: &Cloud, values: &[f64]) -> Vec<RowCopy> {
+    let order = sorted(cloud, |_| true);
+    let value = |row: u32| values[row as usize] + 0.0;
+    let mut copies = Vec::new();
+    for together in order.chunk_by(|&a, &b| coincide(cloud, a, b)).filter(|rows| rows.len() > 1) {
+        let mut rows = together.to_vec();
+        rows.sort_unstable_by(|&a, &b| value(a).total_cmp(&value(b)).then(a.cmp(&b)));
+        for equal in rows.chunk_by(|&a, &b| value(a) == value(b)) {
+            let of = equal[0] as usize;
+            copies.extend(equal[1..].iter().map(|&row| RowCopy { row: row as usize, of }));
+        }
+    }
+    copies.sort_unstable_by_key(|copy| copy.row);
+    copies
+}
+
 /// Flops of [`Merge::duplicates_of`], which allocates and looks up each position: an estimate of 500 ns each.
 pub fn merging_flops(n_points: usize) -> f64 {
     1e4 * n_points as f64
@@ -171,6 +188,11 @@ impl Merge {
         means
     }
 
+    /// Returns the number of its group for each point, `[n′] → [n]`.
+    pub fn repeated(&self, of_groups: &[f64]) -> Vec<f64> {
+        self.group_of.iter().map(|&group| of_groups[group]).collect()
+    }
+
     /// Returns the matrix with each entry split equally over its group, row by row, `[rows, n′] → [rows, n]`.
     pub fn spread(&self, matrix: &[f64]) -> Vec<f64> {
         let spread_row = |row: &[f64]| {
@@ -209,6 +231,16 @@ mod tests {
         assert_eq!(merge.mean(&[3.0, 1.0, 6.0, 7.0, 3.0, 9.0]), [6.0, 2.0, 7.0]);
         assert_eq!(merge.spread(&[3.0, 4.0, 5.0]), [1.0, 2.0, 1.0, 5.0, 2.0, 1.0]);
         assert_eq!(merged(&cloud), None);
+    }
+
+    #[test]
+    fn rows_that_repeat_point_and_value_are_copies_of_the_first() {
+        let copies = row_copies(&cloud(), &[3.0, 1.0, 3.0, 7.0, 2.0, 0.0]);
+        assert_eq!(copies, [RowCopy { row: 2, of: 0 }]);
+        let (without, merge) = Merge::copies(&cloud(), &copies);
+        assert_eq!(without.coordinates(), [5.0, 1.0, 2.0, 1.0, 5.0]);
+        assert_eq!(merge.repeated(&[10.0, 11.0, 12.0, 13.0, 14.0]), [10.0, 11.0, 10.0, 12.0, 13.0, 14.0]);
+        assert_eq!(row_copies(&cloud(), &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]), []);
     }
 
     #[test]

@@ -13,7 +13,7 @@ use gramian_numerics::regression::function::interpolant::Interpolant;
 use gramian_numerics::regression::function::posterior::variances_with_mean;
 use gramian_numerics::regression::selection::{
     Criterion, Hyperparameters, Learned, MAX_EVALUATIONS, Noise, Observations, Observed, Parameter,
-    Selection, Variation, learn, select,
+    ScalePrior, Selection, Variation, learn, select,
 };
 use gramian_numerics::regression::solver::trend::Mean;
 use gramian_numerics::regression::solver::{Solver, System};
@@ -161,6 +161,7 @@ fn chosen(by: By, cloud: &Cloud, values: &[f64]) -> Chosen {
         criterion,
         start: &start,
         vary: &vary,
+        prior: ScalePrior::default(),
         families: &FAMILIES,
         restarts: 1,
         seed: 0,

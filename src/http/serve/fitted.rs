@@ -13,7 +13,7 @@ use gramian_numerics::model::{FittedValues, Model};
 use gramian_numerics::observer::WithoutStages;
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::regression::function::interpolant::Interpolant;
-use gramian_numerics::regression::selection::{Learned, Noise, Observed, learn};
+use gramian_numerics::regression::selection::{Learned, Noise, Observed, learn, learn_alike};
 use gramian_numerics::regression::solver::trend::Mean;
 use gramian_numerics::regression::solver::{Known, Solution};
 use gramian_numerics::surface::Surface;
@@ -122,7 +122,9 @@ impl Fits {
         };
         let values = &self.main.plan.merged(values);
         let (noise, mean) = (Noise::Unknown, Mean::Constant);
-        learn(Observed { cloud, sampling: &sampling, values, noise, mean }, &observer).map(Some)
+        let observed = Observed { cloud, sampling: &sampling, values, noise, mean };
+        let learn = if stretched.is_some() { learn_alike } else { learn };
+        learn(observed, &observer).map(Some)
     }
 }
 

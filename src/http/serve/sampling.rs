@@ -52,7 +52,7 @@ async fn find_learned(
     sampling: Arc<Sampling>,
 ) -> Result<Arc<Learned>, Problem> {
     let (key, cloud) = (values.learned_key, &fit.on.stored.cloud);
-    let price = learning_price(cloud.n_points(), cloud.dimension(), values.n_lists);
+    let price = learning_price(cloud, values.n_lists);
     let asked = fit.learning(values, sampling)?;
     let (shared, admitted) = (app.clone(), admission.clone());
     let looking = async move {

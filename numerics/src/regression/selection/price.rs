@@ -2,7 +2,7 @@
 
 use super::alpha_path::{ALPHAS_AT_ONCE, is_decomposed};
 use super::criterion::Criterion;
-use super::search::MAX_SIDE_BY_SIDE_POINTS;
+use super::search::{MAX_FROM_EVERY_START, MAX_SIDE_BY_SIDE_POINTS, SAMPLE};
 use crate::machine::price::Price;
 
 /// Returns the number of evaluations that a descent over `n_free` numbers usually takes. About 50 were
@@ -23,10 +23,11 @@ pub struct CloudSize {
 pub struct SearchSize {
     /// Free numbers of each descent.
     pub n_free: usize,
-    /// Evaluations of all descents.
+    /// Evaluations of each descent.
     pub n_evaluations: usize,
-    /// Families times starts.
-    pub n_descents: usize,
+    pub n_families: usize,
+    /// Starts of each family.
+    pub n_starts: usize,
     pub n_threads: usize,
 }
 
@@ -35,10 +36,25 @@ pub struct SearchSize {
 /// With all slopes, an evaluation takes n³ flops for the likelihood and 2n³ for other criteria. Without
 /// slopes it takes a third of that. A pass over the pairs is added.
 ///
-/// Descents of up to 1,024 points run side by side on the threads, each with memory of its own.
+/// Descents of up to 1,024 points run side by side on the threads, each with memory of its own. With more
+/// than 768 points, one descent of each family is on all of them, after one evaluation of every start, and
+/// the others are on samples.
 pub fn selection_price(cloud: CloudSize, criterion: Criterion, search: SearchSize) -> Price {
+    if cloud.n_points <= MAX_FROM_EVERY_START || search.n_starts <= 1 {
+        return descents_price(cloud, criterion, search);
+    }
+    let SearchSize { n_evaluations, n_starts, .. } = search;
+    let on_sample = descents_price(CloudSize { n_points: SAMPLE, ..cloud }, criterion, search);
+    let on_all =
+        SearchSize { n_evaluations: n_evaluations.saturating_add(n_starts + 1), n_starts: 1, ..search };
+    on_sample.and(descents_price(cloud, criterion, on_all))
+}
+
+/// Returns the cost of descents from every start.
+fn descents_price(cloud: CloudSize, criterion: Criterion, search: SearchSize) -> Price {
     let CloudSize { n_points, dimension } = cloud;
-    let SearchSize { n_free, n_evaluations, n_descents, n_threads } = search;
+    let SearchSize { n_free, n_evaluations, n_families, n_starts, n_threads } = search;
+    let n_descents = n_families.saturating_mul(n_starts);
     let (n, d) = (n_points as f64, dimension as f64);
     let cubes = match criterion {
         Criterion::MarginalLikelihood if n_free == 0 => 1.0 / 3.0,
@@ -52,7 +68,7 @@ pub fn selection_price(cloud: CloudSize, criterion: Criterion, search: SearchSiz
     let n_numbers = n_points.saturating_mul(n_points).saturating_mul(3).saturating_add(beside);
     Price {
         n_bytes: n_numbers.saturating_mul(side_by_side).saturating_mul(size_of::<f64>()),
-        flops: n_evaluations as f64 * evaluation,
+        flops: n_descents as f64 * n_evaluations as f64 * evaluation,
     }
 }
 
@@ -66,7 +82,8 @@ pub fn alpha_path_price(
 ) -> Price {
     let CloudSize { n_points, dimension } = cloud;
     if !is_decomposed(n_points, n_alphas) {
-        let one_by_one = SearchSize { n_free: 0, n_evaluations: n_alphas, n_descents: 1, n_threads: 1 };
+        let one_by_one =
+            SearchSize { n_free: 0, n_evaluations: n_alphas, n_families: 1, n_starts: 1, n_threads: 1 };
         return selection_price(cloud, criterion, one_by_one);
     }
     let (n, d, m, p) = (n_points as f64, dimension as f64, n_alphas as f64, n_functions as f64);
@@ -102,7 +119,8 @@ mod tests {
     fn more_of_anything_never_costs_less() {
         let criteria =
             [Criterion::MarginalLikelihood, Criterion::LeaveOneOut, Criterion::GeneralizedCrossValidation];
-        let search = |n_evaluations| SearchSize { n_free: 4, n_evaluations, n_descents: 6, n_threads: 2 };
+        let search =
+            |n_evaluations| SearchSize { n_free: 4, n_evaluations, n_families: 2, n_starts: 3, n_threads: 2 };
         for criterion in criteria {
             for (few, many) in [(10, 100), (100, 3000), (3000, 1 << 40)] {
                 let cloud = |n_points| CloudSize { n_points, dimension: 3 };

@@ -2,11 +2,10 @@
 
 use faer::Mat;
 
-use super::learning::remove_mean;
 use crate::error::{NumericsError, Result};
 use crate::machine::vector::dot;
 use crate::points::cloud::Cloud;
-use crate::regression::solver::trend::{Basis, Mean, Trend, solve_gram};
+use crate::regression::solver::trend::{Basis, Mean, Trend, remove_mean, solve_gram};
 use crate::regression::sums::regularization::Regularization;
 
 /// Least difference between 1 and a leverage. Less is rounding.

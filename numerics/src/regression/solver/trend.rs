@@ -286,3 +286,24 @@ pub(crate) fn solve_gram(gram: &Mat<f64>, columns: Mat<f64>) -> Option<Mat<f64>>
     let solved = factor.solve(right);
     Some(Mat::from_fn(p, columns.ncols(), |a, b| solved[(a, b)] / roots[a]))
 }
+
+/// Makes the first p columns orthonormal and the others orthogonal to them (modified Gram–Schmidt). Returns
+/// `ln det FᵀF` of the first p, or `None` if one of them vanishes.
+pub(crate) fn remove_mean(columns: &mut [f64], n: usize, p: usize) -> Option<f64> {
+    let mut log_determinant = 0.0;
+    for a in 0..p {
+        let (done, rest) = columns.split_at_mut((a + 1) * n);
+        let function = &mut done[a * n..];
+        let norm = dot(function, function).sqrt();
+        if norm.is_nan() || norm <= 0.0 {
+            return None;
+        }
+        function.iter_mut().for_each(|f| *f /= norm);
+        log_determinant += 2.0 * norm.ln();
+        for column in rest.chunks_exact_mut(n) {
+            let along = dot(function, column);
+            column.iter_mut().zip(&*function).for_each(|(c, f)| *c -= along * f);
+        }
+    }
+    Some(log_determinant)
+}

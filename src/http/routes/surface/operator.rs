@@ -116,8 +116,8 @@ impl AppliedWork {
             has_deviations,
         };
         let sizes = Sizes { n_points: n, n_queries: m, dimension: d };
-        let mut work =
-            operator_price(main.solver, surface.solver(), asked, sizes).and(learning_price(n, d, 1));
+        let mut work = operator_price(main.solver, surface.solver(), asked, sizes)
+            .and(learning_price(&main.on.stored.cloud, 1));
         // A cloud that the kernel stretches, or whose duplicates are merged, has to be sampled for itself.
         work.n_bytes = work.n_bytes.saturating_add(sampling_price(n, d).n_bytes);
         let n_lists = if has_deviations { 2 } else { 1 };

@@ -1,5 +1,6 @@
 //! `POST /v1/model-selection`: the kernel and the noise that explain values best.
 
+mod rows;
 mod search;
 
 use serde::{Deserialize, Serialize};
@@ -87,12 +88,17 @@ request! {
         /// is given for each point. Its lower bound is a millionth of its start, or of a millionth of the
         /// variance if that is more. Its upper bound is a hundred times its start, or a hundred times the
         /// variance if that is more.
+        ///
+        /// Where length scales of axes vary, the jointly robust prior (Gu 2019) keeps them from fitting
+        /// noise. The search then maximizes the criterion plus the logarithm of the prior.
         pub vary: Option<Vec<FreeParameter>>,
         /// Kernel families to try. Default: that of the start, and `matern` if `nu` varies.
         ///
         /// A family takes the parameters of `kernel` if `kernel` is of that family.
         pub families: Option<Vec<KernelFamily>>,
         /// Number of further starts for each family, spread over the bounds. Default: 2.
+        ///
+        /// With more than 768 points, starts are compared on a sample of them first.
         #[schema(minimum = 0, maximum = 100)]
         pub restarts: Option<u8>,
         /// The seed that determines the further starts. Default: 0.
@@ -111,7 +117,7 @@ pub struct PathEntry {
     pub score: Nullable,
 }
 
-/// Predictions of each value from all others.
+/// Predictions of each value from all others. A row that counts once with another has its prediction.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct LeftOut {
     /// The predictions, in the order of the points. Null where the mean is not determined without the point.
@@ -150,12 +156,13 @@ answer! {
         /// The mean of the function: the constant, then a slope per coordinate if it is linear. Absent if the
         /// mean is 0.
         mean_coefficients: Option<Array> as Option<Vec<f64>>,
-        /// The score of the selection. Greater is better.
+        /// The score of the selection by the criterion alone, without a prior. Greater is better.
         score: f64,
         /// Derivatives of the score in the logarithms of the free parameters, in the order of `vary`.
         ///
-        /// For `length_scales` without an axis, the derivative is in the logarithm of a common factor of all
-        /// length scales. Null for `nu`, which takes steps.
+        /// They are those of the criterion alone. Where length scales of axes vary, the prior may balance
+        /// them. For `length_scales` without an axis, the derivative is in the logarithm of a common factor
+        /// of all length scales. Null for `nu`, which takes steps.
         gradient: Vec<Nullable> as Vec<Option<f64>>,
         /// True if no slope is left to follow within the bounds.
         converged: bool,

@@ -107,14 +107,12 @@ impl FitModel {
                 warn(WarningCode::DuplicatesMerged, detail);
             }
             (Some(_), n_copies) => {
-                let detail = format!(
-                    "rows that repeat point and values of an earlier one: {n_copies}; with the noise left to the values they count once; \
-                     give alpha if they were measured"
-                );
-                warn(WarningCode::RepeatedRows, detail);
+                let Warning { code, detail } = repeated_rows(n_copies);
+                warn(code, detail);
             }
         }
-        if plan.process.is_learned {
+        let has_own_scales = plan.recipe.process().is_some_and(|(kernel, _)| kernel.is_stretched());
+        if plan.process.is_learned && !has_own_scales {
             units_differ(&plan.fitted).into_iter().for_each(|detail| warn(WarningCode::UnitsDiffer, detail));
         }
         if plan.has_least_variance() {
@@ -154,6 +152,15 @@ impl FitModel {
         let remedy = if is_learned { MISFIT_OF_LEARNED } else { MISFIT_OF_GIVEN };
         diagnostics.warn_of_misfit(found, remedy);
     }
+}
+
+/// Returns the warning of rows that count once.
+pub fn repeated_rows(n_copies: usize) -> Warning {
+    let detail = format!(
+        "rows that repeat point and values of an earlier one: {n_copies}; with the noise left to the values they count once; \
+         give alpha if they were measured"
+    );
+    Warning { code: WarningCode::RepeatedRows, detail }
 }
 
 /// Least ratio of the spreads of two coordinates that are worth a warning.

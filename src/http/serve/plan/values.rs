@@ -17,7 +17,7 @@ use gramian_numerics::model::{Recipe, ScaledProcess};
 use gramian_numerics::observer::Observer;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
-use gramian_numerics::regression::selection::{Learned, Noise, Observed, learn, learn_mean};
+use gramian_numerics::regression::selection::{Learned, Noise, Observed, is_table, learn, learn_mean};
 use gramian_numerics::regression::solver::trend::Mean;
 use gramian_numerics::regression::sums::regularization::Regularization;
 
@@ -57,10 +57,12 @@ pub struct Learning {
 }
 
 impl PlannedValues {
-    /// Number of length scales of the kernel: 1, or one for each axis.
+    /// Largest number of length scales that the kernel may have: 1, or one for each axis.
     pub fn n_length_scales(&self) -> usize {
+        let cloud = &self.on.stored.cloud;
         match &self.kernel {
             Some(PlannedKernel::Given(kernel)) => kernel.length_scales().map_or(1, <[f64]>::len),
+            None if is_table(cloud) => cloud.dimension(),
             _ => 1,
         }
     }

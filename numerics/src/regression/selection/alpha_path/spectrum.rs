@@ -11,8 +11,8 @@ use crate::kernel::Kernel;
 use crate::machine::parallelism::parallelism;
 use crate::machine::vector::dot;
 use crate::observer::{Observer, Stage};
-use crate::regression::selection::learning::remove_mean;
 use crate::regression::selection::subject::Subject;
+use crate::regression::solver::trend::remove_mean;
 use crate::regression::sums::gram::{fill_lower_gram, mirror};
 use crate::regression::sums::regularization::Regularization;
 

@@ -4,6 +4,7 @@ use super::contraction::Sums;
 use crate::error::{NumericsError, Result};
 use crate::kernel::Family;
 use crate::regression::selection::parameters::{Hyperparameters, Parameter, Variation};
+use crate::regression::selection::prior::JointlyRobust;
 use crate::regression::sums::regularization::Regularization;
 
 /// Hyperparameters as a function of the logarithms of the free numbers, which lie in a box.
@@ -12,6 +13,8 @@ pub(in crate::regression::selection) struct Space {
     base: Hyperparameters,
     /// Variation of each free number. [`Parameter::LengthScales`] is split into its axes.
     free: Vec<Variation>,
+    /// Prior of the length scales of axes.
+    prior: Option<JointlyRobust>,
 }
 
 impl Space {
@@ -24,7 +27,7 @@ impl Space {
         vary: &[Variation],
         dimension: usize,
     ) -> Result<Self> {
-        let mut space = Self { base: base.clone(), free: Vec::new() };
+        let mut space = Self { base: base.clone(), free: Vec::new(), prior: None };
         for (entry, &variation) in vary.iter().enumerate() {
             let refuse = |requirement| NumericsError::InvalidVariation { entry, requirement };
             variation.check_bounds().map_err(refuse)?;
@@ -49,6 +52,41 @@ impl Space {
         space.check_distinct(vary)?;
         space.base = space.at(&space.start());
         Ok(space)
+    }
+
+    /// Returns the space with a prior on the length scales of axes, which counts if any of them varies.
+    pub(in crate::regression::selection) fn with_prior(self, prior: JointlyRobust) -> Self {
+        let prior = self.per_axis().then_some(prior);
+        Self { prior, ..self }
+    }
+
+    /// Returns the space for some of the points.
+    pub(in crate::regression::selection) fn on(&self, points: &[usize]) -> Self {
+        let mut space = self.clone();
+        if let Regularization::PerPoint(variances) = &self.base.noise {
+            let some: Vec<f64> = points.iter().map(|&point| variances[point]).collect();
+            space.base.noise = Regularization::PerPoint(some);
+        }
+        space
+    }
+
+    /// Returns the logarithm of the prior density, up to a constant. 0 without a prior.
+    pub(in crate::regression::selection) fn log_prior(&self, at: &Hyperparameters) -> f64 {
+        self.prior.as_ref().map_or(0.0, |prior| prior.log_density(&at.length_scales))
+    }
+
+    /// Adds the derivatives of the prior by the logarithms of the free numbers.
+    pub(in crate::regression::selection) fn add_prior_slopes(
+        &self,
+        at: &Hyperparameters,
+        slopes: &mut [f64],
+    ) {
+        let Some(prior) = &self.prior else { return };
+        for (free, slope) in self.free.iter().zip(slopes) {
+            if let Parameter::LengthScaleOfAxis(axis) = free.parameter {
+                *slope += prior.slope(&at.length_scales, axis);
+            }
+        }
     }
 
     /// Checks that no parameter varies twice, and that ℓ and α are single numbers where they vary as such.

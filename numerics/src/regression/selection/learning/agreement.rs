@@ -17,9 +17,16 @@ pub(super) struct Agreement<'a> {
     pub(super) unit: f64,
 }
 
+/// A cell that is decided for.
+pub(super) struct Decided {
+    pub(super) learned: Learned,
+    /// `−ln(likelihood · prior on noise)` of all groups, up to a constant of the values.
+    pub(super) negative_log: f64,
+}
+
 /// Verdict of all groups and of the deep ones on a cell.
 struct Verdict {
-    learned: Learned,
+    decided: Decided,
     /// True if the deep groups have about the same variance as all groups.
     is_of_groups: bool,
     /// True if the values of no place contradict the cell.
@@ -36,16 +43,16 @@ impl Agreement<'_> {
     /// # Errors
     /// `NumericsError::Cancelled`. `NumericsError::WeightsOverflow` for values whose squares exceed
     /// float64.
-    pub(super) fn decided(&mut self, best: [Cell; N_FAMILIES]) -> Result<Option<Learned>> {
+    pub(super) fn decided(&mut self, best: [Cell; N_FAMILIES]) -> Result<Option<Decided>> {
         let best = self.best(best)?;
         let mut cell = self.all.shortest(best)?;
         let (mut of_groups, mut last) = (None, None);
         loop {
-            if let Some(Verdict { learned, is_of_groups, is_of_places }) = self.verdict(cell)? {
+            if let Some(Verdict { decided, is_of_groups, is_of_places }) = self.verdict(cell)? {
                 match (is_of_groups, is_of_places) {
-                    (true, true) => return Ok(Some(learned)),
-                    (true, false) if of_groups.is_none() => of_groups = Some(learned),
-                    _ => last = Some(learned),
+                    (true, true) => return Ok(Some(decided)),
+                    (true, false) if of_groups.is_none() => of_groups = Some(decided),
+                    _ => last = Some(decided),
                 }
             }
             let shorter = self.all.shorter(cell)?;
@@ -87,7 +94,10 @@ impl Agreement<'_> {
         let Some(deep) = deep else { return Ok(None) };
         let variance = all.variance.max(deep.variance);
         Ok(Some(Verdict {
-            learned: self.grid.learned(cell, variance, self.unit)?,
+            decided: Decided {
+                learned: self.grid.learned(cell, variance, self.unit)?,
+                negative_log: self.all.negative_log_posterior(cell)?,
+            },
             is_of_groups: deep.variance <= DISAGREEING * all.variance,
             is_of_places: all.of_places.max(deep.of_places) <= variance,
         }))

@@ -60,6 +60,8 @@ pub(super) const N_CELLS: usize = N_FAMILIES * N_LENGTHS * N_RATIOS;
 /// The grid for given values: their spacing, what is known of their noise, and the least ratio.
 pub(super) struct Grid {
     spacing: f64,
+    /// Scales of the columns, `[d]`, of which length scales are multiples. `None` if all columns share one.
+    columns: Option<Vec<f64>>,
     noise: KnownNoise,
     least_ratio: usize,
 }
@@ -110,9 +112,16 @@ impl Grid {
         let least_ratio = (least * RATIOS_PER_DECADE as f64).ceil() as usize;
         Self {
             spacing: observed.sampling.scales().spacing,
+            columns: None,
             noise,
             least_ratio: least_ratio.min(N_RATIOS - 1),
         }
+    }
+
+    /// Returns the grid of kernels whose length scales are multiples of `scales`, `[d]`. `spacing` is that of
+    /// the points in units of them.
+    pub(super) fn of_columns(values: &Values<'_>, scales: Vec<f64>, spacing: f64) -> Self {
+        Self { spacing, columns: Some(scales), ..Self::of(values) }
     }
 
     /// Returns the kernel and noise for values that do not decide.
@@ -133,6 +142,7 @@ impl Grid {
         Learned {
             family,
             length_scale: family.length_scale_of_values(observed.sampling.scales()),
+            length_scales: None,
             ratio: if self.is_exact() { 0.0 } else { ratio },
             variance: self.known_variance(ratio).unwrap_or(by_values),
             copies: Vec::new(),
@@ -145,16 +155,19 @@ impl Grid {
     /// `unit`.
     ///
     /// # Errors
-    /// [`NumericsError::WeightsOverflow`] for values whose squares exceed float64.
+    /// [`NumericsError::WeightsOverflow`] for values whose squares exceed float64, and the errors of the
+    /// kernel.
     pub(super) fn learned(&self, cell: Cell, variance: f64, unit: f64) -> Result<Learned> {
         let ratio = ratio(cell.ratio);
         let variance = self.known_variance(ratio).unwrap_or(in_units(variance, unit));
         if variance > GREATEST_VARIANCE {
             return Err(NumericsError::WeightsOverflow);
         }
+        let kernel = self.correlations(cell)?;
         Ok(Learned {
-            family: FAMILIES[cell.family],
-            length_scale: self.length_scale(cell.length),
+            family: kernel.family(),
+            length_scale: kernel.length_scale(),
+            length_scales: kernel.length_scales().map(<[f64]>::to_vec),
             ratio: if self.is_exact() { 0.0 } else { ratio },
             variance,
             copies: Vec::new(),
@@ -166,8 +179,19 @@ impl Grid {
     /// Returns the kernel of a cell with variance 1, and the ratio of its noise. `None` if float64 has no
     /// such kernel.
     pub(super) fn kernel(&self, cell: Cell) -> Option<(Kernel, f64)> {
-        let kernel = Kernel::new(FAMILIES[cell.family], self.length_scale(cell.length), 1.0).ok()?;
-        Some((kernel, ratio(cell.ratio)))
+        Some((self.correlations(cell).ok()?, ratio(cell.ratio)))
+    }
+
+    /// Returns the kernel of a cell, of variance 1.
+    fn correlations(&self, cell: Cell) -> Result<Kernel> {
+        let (family, length) = (FAMILIES[cell.family], self.length_scale(cell.length));
+        match &self.columns {
+            None => Kernel::new(family, length, 1.0),
+            Some(scales) => {
+                let length_scales: Vec<f64> = scales.iter().map(|scale| scale * length).collect();
+                Kernel::of_axes(family, &length_scales, 1.0)
+            }
+        }
     }
 
     /// Returns the variance that known noise leaves to a cell, in units of the square of the greatest value,

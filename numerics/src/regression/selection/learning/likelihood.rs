@@ -12,7 +12,7 @@ use crate::error::{NumericsError, Result};
 use crate::kernel::Kernel;
 use crate::machine::vector::dot;
 use crate::observer::Observer;
-use crate::regression::solver::trend::{Mean, Trend, solve_gram};
+use crate::regression::solver::trend::{Mean, Trend, remove_mean, solve_gram};
 use crate::regression::solver::{Disagreement, Outlier, Place};
 
 /// Least ratio of noise to variance with which a mean is found.
@@ -252,25 +252,4 @@ impl<'a> Evidence<'a> {
         let log_determinant = whitened.iter().map(|group| group.log_determinant).sum();
         Ok(Some(Unexplained { columns, n_rows, log_determinant }))
     }
-}
-
-/// Makes the first p columns orthonormal and the others orthogonal to them (modified Gram–Schmidt). Returns
-/// `ln det FᵀF` of the first p, or `None` if one of them vanishes.
-pub(in crate::regression::selection) fn remove_mean(columns: &mut [f64], n: usize, p: usize) -> Option<f64> {
-    let mut log_determinant = 0.0;
-    for a in 0..p {
-        let (done, rest) = columns.split_at_mut((a + 1) * n);
-        let function = &mut done[a * n..];
-        let norm = dot(function, function).sqrt();
-        if norm.is_nan() || norm <= 0.0 {
-            return None;
-        }
-        function.iter_mut().for_each(|f| *f /= norm);
-        log_determinant += 2.0 * norm.ln();
-        for column in rest.chunks_exact_mut(n) {
-            let along = dot(function, column);
-            column.iter_mut().zip(&*function).for_each(|(c, f)| *c -= along * f);
-        }
-    }
-    Some(log_determinant)
 }

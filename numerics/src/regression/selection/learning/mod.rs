@@ -12,6 +12,8 @@
 //! place is outvoted. The result therefore has to agree with every place (agreement.rs).
 
 mod agreement;
+mod columns;
+mod comparison;
 mod grid;
 mod group;
 mod likelihood;
@@ -30,14 +32,12 @@ use crate::points::duplicates::RowCopy;
 use crate::points::sampling::Sampling;
 use crate::regression::solver::Disagreement;
 use crate::regression::solver::trend::{Mean, Trend};
-use agreement::Agreement;
-use grid::{Grid, is_least_variance};
-use likelihood::Evidence;
-use order::Order;
-use search::Search;
+use agreement::Decided;
+use comparison::Comparison;
+use grid::is_least_variance;
 use values::Values;
 
-pub(super) use likelihood::remove_mean;
+pub use columns::is_table;
 pub use price::learning_price;
 
 /// Least ratio of noise to variance that is told from none.
@@ -84,8 +84,10 @@ impl Observed<'_> {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Learned {
     pub family: Family,
-    /// ℓ, unit L.
+    /// ℓ, unit L. The shortest one, if each column has its own.
     pub length_scale: f64,
+    /// ℓ_c of each column, `[d]`, unit L, or `None` if all columns share one.
+    pub length_scales: Option<Vec<f64>>,
     /// Variance of the noise over that of the process. 0 if the noise is known to be 0. For noise that
     /// differs between points, its mean counts.
     pub ratio: f64,
@@ -101,6 +103,17 @@ pub struct Learned {
 }
 
 impl Learned {
+    /// Returns the kernel with some variance, unit V².
+    ///
+    /// # Errors
+    /// `NumericsError::InvalidKernelParameter`.
+    pub fn kernel(&self, variance: f64) -> Result<Kernel> {
+        match &self.length_scales {
+            None => Kernel::new(self.family, self.length_scale, variance),
+            Some(length_scales) => Kernel::of_axes(self.family, length_scales, variance),
+        }
+    }
+
     /// Returns whether the values are so small that their variance was raised to the least one.
     pub fn has_least_variance(&self) -> bool {
         is_least_variance(self.variance)
@@ -108,7 +121,9 @@ impl Learned {
 
     /// Bytes held on the heap.
     pub fn n_bytes(&self) -> usize {
-        self.trend.as_ref().map_or(0, Trend::n_bytes) + vec_bytes(&self.copies)
+        self.trend.as_ref().map_or(0, Trend::n_bytes)
+            + vec_bytes(&self.copies)
+            + self.length_scales.as_ref().map_or(0, vec_bytes)
     }
 }
 
@@ -141,42 +156,37 @@ const LEAST_VALUES: usize = 8;
 /// `NumericsError::Cancelled`, `NumericsError::LengthMismatch`, `NumericsError::MeanNotDetermined`.
 /// `NumericsError::WeightsOverflow` for values whose squares exceed float64.
 pub fn learn(observed: Observed<'_>, observer: &dyn Observer) -> Result<Learned> {
-    observed.check()?;
-    let values = Values::of(observed);
-    let order = Order::of(&observed, observer)?;
-    let all = Evidence::of(&values, &order.searched);
-    let n_positions = observed.sampling.neighbours().n_positions();
-    let decided = if n_positions < LEAST_VALUES || values.is_constant() {
-        None
-    } else {
-        search(&all, &order, observer)?
-    };
-    let learned = decided.unwrap_or_else(|| Grid::of(&values).undecided(&values));
-    let kernel = Kernel::new(learned.family, learned.length_scale, 1.0)?;
-    all.concluded(&kernel, Learned { copies: values.copies(), ..learned }, observer)
+    let learn = if is_table(observed.cloud) { columns::decided } else { columns::decided_alike };
+    learn_by(observed, learn, observer)
 }
 
-/// Searches the grid on all values, or on a sample and from there on all values in groups.
-fn search(all: &Evidence<'_>, order: &Order, observer: &dyn Observer) -> Result<Option<Learned>> {
-    let (values, grid) = (all.values, Grid::of(all.values));
-    let deep = Evidence::of(values, &order.deep);
-    let mut agreement = Agreement {
-        all: Search::new(all, &grid, observer),
-        deep: (!order.deep.is_empty()).then(|| Search::new(&deep, &grid, observer)),
-        grid: &grid,
-        unit: values.unit,
+/// Learns as [`learn`] does, with one length scale for all columns.
+///
+/// # Errors
+/// Returns the errors of [`learn`].
+pub fn learn_alike(observed: Observed<'_>, observer: &dyn Observer) -> Result<Learned> {
+    learn_by(observed, columns::decided_alike, observer)
+}
+
+/// A comparison of kernels and what it decided, if the values decide anything.
+type Outcome<'a> = (Comparison<'a>, Option<Decided>);
+
+fn learn_by(
+    observed: Observed<'_>,
+    decide: for<'a> fn(&'a Values<'a>, &dyn Observer) -> Result<Outcome<'a>>,
+    observer: &dyn Observer,
+) -> Result<Learned> {
+    observed.check()?;
+    let values = Values::of(observed);
+    let n_positions = observed.sampling.neighbours().n_positions();
+    let (comparison, decided) = if n_positions < LEAST_VALUES || values.is_constant() {
+        (Comparison::of(&values, observer)?, None)
+    } else {
+        decide(&values, observer)?
     };
-    let best = match order.searched.as_slice() {
-        [first, _, ..] => {
-            let sample = Evidence::of(values, std::slice::from_ref(first));
-            let mut on_sample = Search::new(&sample, &grid, observer);
-            let Some(best) = on_sample.best()? else { return Ok(None) };
-            let Some(begin) = on_sample.likeliest(best.into_iter())? else { return Ok(None) };
-            Some(agreement.all.best_from(begin)?)
-        }
-        _ => agreement.all.best()?,
-    };
-    best.map_or(Ok(None), |best| agreement.decided(best))
+    let learned = decided.map_or_else(|| comparison.undecided(), |decided| decided.learned);
+    let kernel = learned.kernel(1.0)?;
+    comparison.concluded(&kernel, Learned { copies: values.copies(), ..learned }, observer)
 }
 
 /// Finds the mean of values under a given kernel and noise.
@@ -192,17 +202,17 @@ pub fn learn_mean(observed: Observed<'_>, kernel: &Kernel, observer: &dyn Observ
         Noise::PerPoint(all) => all.iter().sum::<f64>() / all.len() as f64 / variance,
     };
     let values = Values::of(observed);
-    let order = Order::of(&observed, observer)?;
     let given = Learned {
         family: kernel.family(),
         length_scale: kernel.length_scale(),
+        length_scales: kernel.length_scales().map(<[f64]>::to_vec),
         ratio,
         variance,
         copies: Vec::new(),
         trend: None,
         disagreement: None,
     };
-    Evidence::of(&values, &order.searched).concluded(&kernel.clone().of_variance_one(), given, observer)
+    Comparison::of(&values, observer)?.concluded(&kernel.clone().of_variance_one(), given, observer)
 }
 
 #[cfg(test)]

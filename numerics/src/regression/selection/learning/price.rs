@@ -1,9 +1,13 @@
 //! Cost of learning, estimated before it begins.
 
+use super::columns::{self, is_table};
 use super::order::{DEEP_GROUPS, GIVEN, GIVEN_DEEP, MAX_GROUPS, MAX_SAMPLE, MAX_TOGETHER, RESPONSES};
 use super::values::MAX_LISTS;
 use crate::machine::price::Price;
+use crate::points::cloud::Cloud;
 use crate::points::sampling::sampling_price;
+use crate::regression::selection::criterion::Criterion;
+use crate::regression::selection::price::{CloudSize, SearchSize, selection_price};
 
 /// Number of cells of the grid that a search from nothing usually scores. [`CELLS_FROM_SAMPLE`] is for a
 /// search that begins at the result of a sample, [`CELLS_OF_DEEP`] for deep groups.
@@ -14,13 +18,33 @@ const CELLS_OF_DEEP: f64 = 4.0;
 /// Flops to order one point.
 const FLOPS_OF_ORDER: f64 = 500.0;
 
-/// Returns the cost of [`super::learn`] for `n_lists` lists of values at n points of d dimensions, without
-/// the sampling of the cloud.
+/// Returns the cost of [`super::learn`] for `n_lists` lists of values at the points of a cloud, without the
+/// sampling of the cloud.
+///
+/// For a table whose columns may get length scales of their own, kernels are compared up to three times, and
+/// a descent on a sample of the rows finds the scales.
+pub fn learning_price(cloud: &Cloud, n_lists: usize) -> Price {
+    let (n, d) = (cloud.n_points(), cloud.dimension());
+    let alike = comparison_price(n, d, n_lists);
+    if !is_table(cloud) {
+        return alike;
+    }
+    let sample = CloudSize { n_points: n.min(columns::MAX_SAMPLE), dimension: d };
+    let n_evaluations = columns::MAX_EVALUATIONS;
+    let size = SearchSize { n_free: d + 2, n_evaluations, n_families: 1, n_starts: 1, n_threads: 1 };
+    let of_descent = selection_price(sample, Criterion::MarginalLikelihood, size);
+    // The points in units of their scales are another cloud, with a tree of its own.
+    let mut of_scales = alike.and(sampling_price(n, d));
+    of_scales.n_bytes = of_scales.n_bytes.saturating_add(n.saturating_mul(d * size_of::<f64>()));
+    alike.and(of_descent).and(of_scales).and(of_scales)
+}
+
+/// Returns the cost of one comparison of kernels on values at n points of d dimensions.
 ///
 /// Bytes are those of the order, of the groups, and of the matrices that are factorized side by side. The
 /// order holds the earlier points with their tree, and indices. The groups hold what the mean and the lists
 /// of values leave of them.
-pub fn learning_price(n_points: usize, dimension: usize, n_lists: usize) -> Price {
+fn comparison_price(n_points: usize, dimension: usize, n_lists: usize) -> Price {
     let together = |n: usize| (n * n) as f64 * (n as f64 / 3.0 + 20.0);
     let square = |n: usize| n.saturating_mul(n);
     let (given, deep) = (GIVEN + RESPONSES, GIVEN_DEEP + RESPONSES);

@@ -187,3 +187,63 @@ fn rows_at_one_place_are_read_in_any_unit_and_if_all_are_zero() {
         assert!(found.variance.is_finite(), "{unit}: {}", found.variance);
     }
 }
+
+/// Rows of six columns, of which the values depend on two, with noise of 0.05 in them. Columns have these
+/// units.
+fn table(seed: u64, n: usize, units: [f64; 6]) -> (Cloud, Vec<f64>) {
+    let mut random = Random(seed);
+    let rows: Vec<f64> = (0..6 * n).map(|_| random.normal()).collect();
+    let value = |x: &[f64]| (2.0 * x[0]).sin() + 0.5 * x[1] * x[1];
+    let values = rows.chunks_exact(6).map(|x| value(x) + 0.05 * random.normal()).collect();
+    let scaled = rows.iter().enumerate().map(|(at, x)| units[at % 6] * x).collect();
+    (Cloud::new(scaled, 6).unwrap(), values)
+}
+
+#[test]
+fn columns_of_a_table_have_length_scales_in_their_units() {
+    // One size forms one group, the other several.
+    for n in [150, 500] {
+        let in_units = |units: [f64; 6]| -> Vec<f64> {
+            let (cloud, values) = table(n as u64, n, units);
+            let found = learned(&cloud, &values, Noise::Unknown);
+            let deviation = (found.ratio * found.variance).sqrt();
+            assert!((0.03..0.08).contains(&deviation), "{n}: noise {deviation}");
+            let scales = found.length_scales.unwrap_or_else(|| panic!("{n}: one length scale for all"));
+            scales.iter().zip(units).map(|(scale, unit)| scale / unit).collect()
+        };
+        let found = in_units([1e-3, 1e2, 1.0, 1e3, 1e-2, 10.0]);
+        let most = found[0].max(found[1]);
+        assert!(found[2..].iter().all(|&scale| scale > 2.0 * most), "{n}: {found:?}");
+        // A descent begins at what the comparison before it found, which depends on units a little. Its end
+        // does not, up to the family.
+        let others = in_units([1e3, 1.0, 1e-2, 1.0, 1e2, 1e-3]);
+        let ratio = found[1] / found[0] * others[0] / others[1];
+        assert!(ratio.ln().abs() < 0.7, "{n}: {found:?} {others:?}");
+    }
+}
+
+#[test]
+fn a_noise_that_is_known_is_kept_for_columns_and_a_column_that_does_not_vary_is_no_obstacle() {
+    let (cloud, values) = table(3, 200, [1e-3, 1e2, 0.0, 1e3, 1e-2, 10.0]);
+    let uniform = learned(&cloud, &values, Noise::Uniform(0.0025));
+    assert!((uniform.ratio * uniform.variance / 0.0025 - 1.0).abs() < 1e-12);
+    let per_point = learned(&cloud, &values, Noise::PerPoint(&[0.0025; 200]));
+    for found in [uniform, per_point] {
+        let scales = found.length_scales.unwrap();
+        assert!(scales[0] < 0.01 && scales[1] > 10.0 && scales[2] == scales[0], "{scales:?}");
+    }
+}
+
+#[test]
+fn noise_and_places_have_one_length_scale() {
+    for seed in 1..=5 {
+        let mut random = Random(seed);
+        let (cloud, _) = table(seed, 150, [1e-3, 1e2, 1.0, 1e3, 1e-2, 10.0]);
+        let noise: Vec<f64> = (0..150).map(|_| random.normal()).collect();
+        assert_eq!(learned(&cloud, &noise, Noise::Unknown).length_scales, None, "{seed}");
+    }
+    // Layers: the values depend on one coordinate alone. Places may be rotated all the same.
+    let cloud = fibonacci_sphere(300);
+    let layers: Vec<f64> = cloud.points().map(|x| (4.0 * x[2]).sin()).collect();
+    assert_eq!(learned(&cloud, &layers, Noise::Unknown).length_scales, None);
+}

@@ -2,9 +2,8 @@
 
 mod descent;
 mod served;
+mod starts;
 mod walk;
-
-use rayon::prelude::*;
 
 use crate::error::{NumericsError, Result};
 use crate::kernel::Family;
@@ -13,10 +12,13 @@ use crate::regression::selection::criterion::Criterion;
 use crate::regression::selection::evaluation::space::Space;
 use crate::regression::selection::evaluation::{Evaluator, never_definite};
 use crate::regression::selection::parameters::{Hyperparameters, Parameter, Variation};
+use crate::regression::selection::prior::{JointlyRobust, ScalePrior};
 use crate::regression::selection::subject::{Observations, Subject};
 use crate::regression::solver::trend::Trend;
 pub use descent::Side;
-use descent::{descend, finish, side};
+use descent::{finish, side};
+use starts::{Ascended, Starts, ascended};
+pub(super) use starts::{MAX_FROM_EVERY_START, SAMPLE};
 use walk::Found;
 
 /// Usual limit of evaluations of one descent.
@@ -35,10 +37,14 @@ pub struct Selection<'a> {
     pub start: &'a Hyperparameters,
     /// Free parameters. If there are none, only the start is evaluated.
     pub vary: &'a [Variation],
+    /// Prior on the length scales of axes, if any of them varies. Its logarithm is added to the criterion,
+    /// for cross-validation to `−½n ln(−score)`. Scores are those of the criterion alone.
+    pub prior: ScalePrior,
     /// Families to try; empty for the family of the start alone. Laplace takes its ε from here unless ε
     /// varies.
     pub families: &'a [Family],
-    /// Further starts, spread over the logarithms of the bounds.
+    /// Further starts, spread over the logarithms of the bounds. With more than 768 points, starts descend on
+    /// a sample of 384, and the likeliest end by all points descends further on all of them.
     pub restarts: usize,
     /// Seed of the further starts.
     pub seed: u64,
@@ -52,15 +58,15 @@ pub struct Selected {
     pub hyperparameters: Hyperparameters,
     /// Score of the criterion. Greater is better.
     pub score: f64,
-    /// Derivatives of the score by the logarithms of the free numbers. [`Parameter::LengthScales`] has one
-    /// for each axis. Same order as `free`.
+    /// Derivatives of the score by the logarithms of the free numbers, without those of the prior.
+    /// [`Parameter::LengthScales`] has one for each axis. Same order as `free`.
     pub gradient: Vec<f64>,
     /// Parameter of each free number, and the bound that it is at, if any.
     pub free: Vec<(Parameter, Option<Side>)>,
     /// Evaluations of the criterion by all descents together.
     pub evaluations: usize,
-    /// True if no component of the gradient exceeds 0.01 per factor of e, in units of log likelihood.
-    /// Components that lead out of the bounds do not count.
+    /// True if no component of the gradient, the prior's included, exceeds 0.01 per factor of e, in units of
+    /// log likelihood. Components that lead out of the bounds do not count.
     pub converged: bool,
     /// Mean from generalised least squares, in coordinates of the cloud.
     pub trend: Option<Trend>,
@@ -69,8 +75,7 @@ pub struct Selected {
     pub families: Vec<(Family, Option<f64>)>,
 }
 
-/// Searches for the best hyperparameters: from the start and further starts, with every family, each in a
-/// descent of its own.
+/// Searches for the best hyperparameters: from the start and further starts, with every family.
 ///
 /// The start is moved into the bounds first. The number of threads changes the result by rounding only.
 ///
@@ -80,6 +85,15 @@ pub struct Selected {
 /// the points. [`NumericsError::NotPositiveDefinite`] if the matrix is not positive definite at any start.
 /// [`NumericsError::Cancelled`], and the errors of [`Hyperparameters::kernel_on`].
 pub fn select(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Selected> {
+    observer.enter(Stage::Factor);
+    search(selection, observer)
+}
+
+/// Searches as [`select`] does, as a part of other work.
+///
+/// # Errors
+/// Returns the errors of [`select`].
+pub(super) fn search(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Selected> {
     let Selection { observations, vary, start, .. } = *selection;
     let (subject, cloud) = (Subject::of(observations)?, observations.cloud);
     start.noise.check_matches(cloud)?;
@@ -91,15 +105,20 @@ pub fn select(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Sele
     let mut spaces = Vec::with_capacity(families.len());
     for &family in families {
         let base = Hyperparameters { family, ..start.clone() };
-        let space = Space::of(&base, vary, cloud.dimension())?;
+        let space = match selection.prior {
+            ScalePrior::Flat => Space::of(&base, vary, cloud.dimension())?,
+            ScalePrior::JointlyRobust => {
+                Space::of(&base, vary, cloud.dimension())?.with_prior(JointlyRobust::of(cloud))
+            }
+        };
         // An invalid start is refused here, with its reason.
         space.at(&space.start()).kernel_on(cloud)?;
         spaces.push(space);
     }
-    observer.enter(Stage::Factor);
-    let jobs: Vec<(&Space, Vec<f64>)> = spaces.iter().flat_map(|space| starts(space, selection)).collect();
-    let descents = run_all(&subject, selection, &jobs, observer)?;
-    best_of(&subject, selection, &spaces, descents, observer)
+    let starts = |space| Starts { space, at: starts(space, selection) };
+    let starts: Vec<Starts<'_>> = spaces.iter().map(starts).collect();
+    let ascended = ascended(&subject, selection, &starts, observer)?;
+    best_of(&subject, selection, &spaces, ascended, observer)
 }
 
 /// Refuses a varying ε unless one of the families has it.
@@ -116,7 +135,7 @@ fn check_epsilon(families: &[Family], vary: &[Variation]) -> Result<()> {
 
 /// Returns the start of a space, then the restarts: points of the R-sequence (Roberts 2018), shifted by an
 /// offset from the seed.
-fn starts<'a>(space: &'a Space, selection: &Selection<'_>) -> Vec<(&'a Space, Vec<f64>)> {
+fn starts(space: &Space, selection: &Selection<'_>) -> Vec<Vec<f64>> {
     let bounds = space.bounds();
     let dimension = bounds.len();
     // The root of x^(d+1) = x + 1.
@@ -131,8 +150,7 @@ fn starts<'a>(space: &'a Space, selection: &Selection<'_>) -> Vec<(&'a Space, Ve
         bounds.iter().enumerate().map(coordinate).collect()
     };
     let n_restarts = if dimension == 0 { 0 } else { selection.restarts };
-    let all = std::iter::once(space.start()).chain((0..n_restarts).map(restart));
-    all.map(|start| (space, start)).collect()
+    std::iter::once(space.start()).chain((0..n_restarts).map(restart)).collect()
 }
 
 /// Returns the next number in `[0, 1)` (SplitMix64: Steele, Lea and Flood 2014).
@@ -144,46 +162,22 @@ fn uniform(state: &mut u64) -> f64 {
     ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// Runs all descents. Results are in the order of the jobs.
-fn run_all(
-    subject: &Subject<'_>,
-    selection: &Selection<'_>,
-    jobs: &[(&Space, Vec<f64>)],
-    observer: &dyn Observer,
-) -> Result<Vec<(Option<Found>, usize)>> {
-    let side_by_side = jobs.len() > 1 && subject.n_points() <= MAX_SIDE_BY_SIDE_POINTS;
-    // Side by side, each evaluator keeps to its own thread.
-    let evaluator = || Evaluator::new(subject, selection.criterion, side_by_side);
-    let job = |evaluator: &mut Evaluator<'_>, (space, start): &(&Space, Vec<f64>)| {
-        descend(evaluator, space, start, selection.max_evaluations, observer)
-    };
-    if side_by_side {
-        jobs.par_iter().with_max_len(1).map_init(evaluator, job).collect()
-    } else {
-        let mut evaluator = evaluator();
-        jobs.iter().map(|start| job(&mut evaluator, start)).collect()
-    }
-}
-
-/// Picks the best descent and refines it with the evaluations that it has left. `descents` holds them family
-/// by family.
+/// Picks the best descent and refines it with the evaluations that it has left. `ascended` is in the order of
+/// the spaces.
 fn best_of(
     subject: &Subject<'_>,
     selection: &Selection<'_>,
     spaces: &[Space],
-    descents: Vec<(Option<Found>, usize)>,
+    ascended: Vec<Ascended>,
     observer: &dyn Observer,
 ) -> Result<Selected> {
-    let mut evaluations: usize = descents.iter().map(|(_, evaluations)| evaluations).sum();
-    // Every space has the same free numbers (other families ignore ε), so each has equally many starts.
-    let per_family = descents.len() / spaces.len();
+    let mut evaluations: usize = ascended.iter().map(|ascended| ascended.evaluations).sum();
     let mut scores = vec![None; spaces.len()];
     let mut best: Option<(usize, Found, usize)> = None;
-    for (at, (found, used)) in descents.into_iter().enumerate() {
+    for (family, Ascended { best: found, used, .. }) in ascended.into_iter().enumerate() {
         let Some(found) = found else { continue };
-        let family = at / per_family;
-        scores[family] = Some(scores[family].map_or(found.score, |score: f64| score.max(found.score)));
-        if best.as_ref().is_none_or(|(_, best, _)| best.score < found.score) {
+        scores[family] = Some(found.score);
+        if best.as_ref().is_none_or(|(_, best, _)| best.merit < found.merit) {
             best = Some((family, found, used));
         }
     }

@@ -39,6 +39,7 @@ fn selection<'a>(
         criterion: Criterion::MarginalLikelihood,
         start,
         vary,
+        prior: ScalePrior::Flat,
         families: &[],
         restarts: 0,
         seed: 0,
@@ -210,4 +211,51 @@ fn evaluations_are_bounded() {
     let asked = selection(&cloud, &values, &start, &vary);
     let found = select(&Selection { max_evaluations: 5, ..asked }, &Unobserved).unwrap();
     assert!(found.evaluations <= 7 && !found.converged, "{found:?}");
+}
+
+/// A hundred values at random points in six dimensions, of which the first matters a little.
+fn weak(random: &mut Random) -> (Cloud, Vec<f64>) {
+    let cloud = Cloud::new((0..600).map(|_| random.normal()).collect(), 6).unwrap();
+    let values = cloud.points().map(|x| 0.3 * x[0] + random.normal()).collect();
+    (cloud, values)
+}
+
+#[test]
+fn a_prior_keeps_axes_from_fitting_noise() {
+    let mut gain = 0.0;
+    for seed in 1..=4 {
+        let random = &mut Random(seed);
+        let ((cloud, values), (others, other_values)) = (weak(random), weak(random));
+        let start = start(2.0, 0.5);
+        let mut vary = vary(&[Parameter::LengthScales], 1e-2, 1e3);
+        vary.extend(self::vary(&[Parameter::Variance, Parameter::Alpha], 1e-4, 1e2));
+        let [flat, robust] = [ScalePrior::Flat, ScalePrior::JointlyRobust].map(|prior| {
+            let asked = Selection { prior, restarts: 2, ..selection(&cloud, &values, &start, &vary) };
+            let found = select(&asked, &Unobserved).unwrap();
+            let elsewhere = selection(&others, &other_values, &found.hyperparameters, &[]);
+            (found.score, select(&elsewhere, &Unobserved).unwrap().score)
+        });
+        // The prior has a price in the likelihood of the values, and gains in that of others.
+        assert!(flat.0 > robust.0 - 1e-3, "{seed}: {flat:?} {robust:?}");
+        gain += robust.1 - flat.1;
+    }
+    assert!(gain > 0.0, "{gain}");
+}
+
+#[test]
+fn starts_of_a_large_search_descend_on_a_sample() {
+    // The start takes all for noise. A restart finds the structure, on a sample first.
+    let points: Vec<f64> = (0..900).map(|i| 0.02 * f64::from(i)).collect();
+    let random = &mut Random(13);
+    let values: Vec<f64> = points.iter().map(|x| (7.0 * x).sin() + 0.3 * random.normal()).collect();
+    let cloud = Cloud::new(points, 1).unwrap();
+    let start = start(50.0, 1.0);
+    let vary = vary(&[Parameter::LengthScale, Parameter::Alpha], 1e-2, 1e2);
+    let asked = selection(&cloud, &values, &start, &vary);
+    let found = select(&Selection { restarts: 4, ..asked }, &Unobserved).unwrap();
+    let noise = found.hyperparameters.noise.at(0).sqrt();
+    assert!(found.converged && (0.27..0.33).contains(&noise), "{found:?}");
+    assert!(found.hyperparameters.length_scales[0] < 1.0, "{found:?}");
+    let alone = select(&Selection { start: &found.hyperparameters, ..asked }, &Unobserved).unwrap();
+    assert!((alone.score - found.score).abs() < 1e-3, "{} {}", alone.score, found.score);
 }

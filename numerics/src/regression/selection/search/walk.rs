@@ -19,12 +19,14 @@ pub(super) struct Found {
     pub(super) logarithms: Vec<f64>,
     pub(super) hyperparameters: Hyperparameters,
     pub(super) score: f64,
+    /// The score on the scale of a log likelihood, plus the logarithm of the prior.
+    pub(super) merit: f64,
     /// Derivatives of the score by the logarithms.
     pub(super) gradient: Vec<f64>,
     pub(super) converged: bool,
 }
 
-/// The objective for slsqp: −scale · merit over log-hyperparameters divided by `units`.
+/// The objective for slsqp: −scale · merit, prior included, over log-hyperparameters divided by `units`.
 pub(super) struct Walk<'a, 'b> {
     evaluator: &'a mut Evaluator<'b>,
     space: &'a Space,
@@ -113,8 +115,9 @@ impl<'a, 'b> Walk<'a, 'b> {
             self.evaluations += 1;
             self.at = Some(Point { logarithms: x.to_vec(), hyperparameters, state, gradient: None });
         }
-        let Some(state) = self.at.as_ref().and_then(|at| at.state.as_ref()) else { return Ok(None) };
+        let Some(Point { hyperparameters, state: Some(state), .. }) = &self.at else { return Ok(None) };
         let (merit, _) = self.evaluator.criterion().merit(state.score, self.evaluator.n_points());
+        let merit = merit + self.space.log_prior(hyperparameters);
         if self.best.as_ref().is_none_or(|(_, best)| *best < merit) {
             self.best = Some((x.to_vec(), merit));
         }
@@ -133,7 +136,8 @@ impl<'a, 'b> Walk<'a, 'b> {
             None => self.evaluator.gradient(self.space, hyperparameters, state, self.observer)?,
         };
         let (_, factor) = criterion.merit(state.score, n);
-        let slopes = found.iter().map(|slope| factor * slope).collect();
+        let mut slopes: Vec<f64> = found.iter().map(|slope| factor * slope).collect();
+        self.space.add_prior_slopes(hyperparameters, &mut slopes);
         *gradient = Some(found);
         Ok(slopes)
     }
@@ -146,12 +150,13 @@ impl<'a, 'b> Walk<'a, 'b> {
     pub(super) fn end(mut self, start: &[f64], bounds: &[(f64, f64)]) -> Result<Option<Found>> {
         let logarithms = self.best_logarithms(start);
         let slopes = self.slopes(&logarithms)?;
+        let merit = self.merit(&logarithms)?.unwrap_or(f64::NEG_INFINITY);
         let Some(Point { hyperparameters, state: Some(state), gradient, .. }) = self.at else {
             return Ok(None);
         };
         let (score, gradient) = (state.score, gradient.unwrap_or_default());
         let converged = free_slopes(&logarithms, &slopes, bounds).all(|slope| slope.abs() <= FLAT);
-        Ok(Some(Found { logarithms, hyperparameters, score, gradient, converged }))
+        Ok(Some(Found { logarithms, hyperparameters, score, merit, gradient, converged }))
     }
 }
 

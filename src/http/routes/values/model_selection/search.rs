@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use super::rows::Rows;
 use super::{
     FamilyScore, FreeParameter, LeftOut, MAX_PATH_POINTS, ModelSelectionRequest, ModelSelectionResponse,
     N_ALPHAS, PathEntry, SelectionCriterion, SelectionParameter,
@@ -22,9 +23,9 @@ use gramian_numerics::machine::price::Price;
 use gramian_numerics::model::Report;
 use gramian_numerics::regression::function::interpolant::Interpolant;
 use gramian_numerics::regression::selection::{
-    CloudSize, Criterion, Hyperparameters, LeaveOneOut, MAX_EVALUATIONS, Observations, Parameter, SearchSize,
-    Selected, Selection, Variation, alpha_path, alpha_path_price, default_alphas, expected_evaluations,
-    leave_one_out_price, leave_one_out_with, select, selection_price,
+    CloudSize, Criterion, Hyperparameters, LeaveOneOut, MAX_EVALUATIONS, Observations, Parameter, ScalePrior,
+    SearchSize, Selected, Selection, Variation, alpha_path, alpha_path_price, default_alphas,
+    expected_evaluations, leave_one_out_price, leave_one_out_with, select, selection_price,
 };
 use gramian_numerics::regression::solver::trend::Trend;
 use gramian_numerics::regression::sums::regularization::Regularization;
@@ -127,10 +128,10 @@ impl Search {
             None => 2 + n_length_scales,
             Some(vary) => vary.iter().map(|free| if is_of_axes(free) { d } else { 1 }).sum(),
         };
-        let n_descents = self.n_families() * (1 + self.restarts);
-        let n_evaluations = n_descents * expected_evaluations(n_free);
+        let (n_families, n_starts) = (self.n_families(), 1 + self.restarts);
+        let n_evaluations = expected_evaluations(n_free);
         let n_threads = rayon::current_num_threads();
-        let size = SearchSize { n_free, n_evaluations, n_descents, n_threads };
+        let size = SearchSize { n_free, n_evaluations, n_families, n_starts, n_threads };
         let cloud = CloudSize { n_points: n, dimension: d };
         let price = selection_price(cloud, self.criterion, size).and(leave_one_out_price(n, 1 + d));
         if n <= MAX_PATH_POINTS {
@@ -178,6 +179,18 @@ impl Search {
             (None, Family::Matern { .. }) => vec![start],
             (None, _) => vec![Family::Matern { order: 2 }],
         }
+    }
+
+    /// Returns the start with one length scale, the geometric mean, if that is to vary and learning found one
+    /// for each axis.
+    fn sharing(&self, start: Hyperparameters) -> Hyperparameters {
+        let shares = |free: &FreeParameter| free.parameter == SelectionParameter::LengthScale;
+        if !self.vary.iter().flatten().any(shares) {
+            return start;
+        }
+        let logarithms = start.length_scales.iter().map(|length_scale| length_scale.ln());
+        let shared = (logarithms.sum::<f64>() / start.length_scales.len() as f64).exp();
+        Hyperparameters { length_scales: vec![shared], ..start }
     }
 
     /// Returns the free parameters other than ν, each with its position in `vary`.
@@ -267,7 +280,7 @@ impl Work {
         let Interpolant { solver, solution } = fits.interpolant(&values, observer)?;
         let scale = plan.process.scale;
         let report = Report::of_function(&solver, &solution, scale);
-        let diagnostics = fits.main.diagnostics(&report, plan.stored.cloud.n_points());
+        let mut diagnostics = fits.main.diagnostics(&report, plan.stored.cloud.n_points());
         let start = scaled(solver.kernel(), solver.regularization(), scale);
         let start = start.map_err(|error| {
             if plan.process.is_learned {
@@ -276,15 +289,19 @@ impl Work {
                 plan.refused(error)
             }
         })?;
+        let start = if plan.process.is_learned { search.sharing(start) } else { start };
         let variations = search.variations(&start);
         let vary: Vec<Variation> = variations.iter().map(|(_, variation)| *variation).collect();
-        let merged = plan.merged(&values.list);
-        let (cloud, mean) = (&*plan.fitted, plan.process.mean);
+        let finds_noise = vary.iter().any(|variation| variation.parameter == Parameter::Alpha);
+        let rows = Rows::of(plan, &values.list, finds_noise);
+        rows.warn(&mut diagnostics);
+        let (cloud, mean) = (&*rows.cloud, plan.process.mean);
         let selection = Selection {
-            observations: Observations { cloud, values: &merged, mean },
+            observations: Observations { cloud, values: &rows.values, mean },
             criterion: search.criterion,
             start: &start,
             vary: &vary,
+            prior: ScalePrior::JointlyRobust,
             families: &search.families(start.family),
             restarts: search.restarts,
             seed: search.seed,
@@ -303,12 +320,7 @@ impl Work {
         let left_out = leave_one_out_with(selection.observations, &selected.hyperparameters, observer);
         let path = path(&selection, &selected.hyperparameters, observer).map_err(refused)?;
         let n_given = search.vary.as_ref().map_or(variations.len(), Vec::len);
-        let mut gradient = vec![Nullable(None); n_given];
-        let mut slopes = selected.gradient.iter();
-        for (at, variation) in &variations {
-            let n_free = if variation.parameter == Parameter::LengthScales { cloud.dimension() } else { 1 };
-            gradient[*at] = Nullable(Some(slopes.by_ref().take(n_free).sum()));
-        }
+        let gradient = gradient(&selected, &variations, n_given);
         let kernel = selected.hyperparameters.kernel_on(cloud).map_err(refused)?;
         let noise = &selected.hyperparameters.noise;
         Ok(ModelSelectionResponse {
@@ -327,10 +339,22 @@ impl Work {
             evaluations: selected.evaluations,
             families: family_scores(&selected),
             path,
-            leave_one_out: left_out.map_err(refused)?.into(),
+            leave_one_out: rows.left_out(left_out.map_err(refused)?).into(),
             diagnostics,
         })
     }
+}
+
+/// Returns the slopes of the selection for each of `n_given` entries of `vary`. Null for `nu`.
+fn gradient(selected: &Selected, variations: &[(usize, Variation)], n_given: usize) -> Vec<Nullable> {
+    let n_axes = selected.hyperparameters.length_scales.len();
+    let mut gradient = vec![Nullable(None); n_given];
+    let mut slopes = selected.gradient.iter();
+    for (at, variation) in variations {
+        let n_free = if variation.parameter == Parameter::LengthScales { n_axes } else { 1 };
+        gradient[*at] = Nullable(Some(slopes.by_ref().take(n_free).sum()));
+    }
+    gradient
 }
 
 /// Returns the start of the search: kernel and noise in the unit of the values.
