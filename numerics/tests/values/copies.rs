@@ -19,6 +19,7 @@ pub struct Repeated {
     pub n_copies: usize,
     /// Places that are measured once more.
     pub n_differing: usize,
+    pub by: By,
 }
 
 impl Repeated {
@@ -48,7 +49,7 @@ impl Repeated {
             values.push(if is_copy { values[row] } else { exact[row] + self.noise * random.normal() });
         }
         let (cloud, at) = (Arc::new(Cloud::new(points, 2).unwrap()), Cloud::new(queries, 2).unwrap());
-        let Posterior { means, variances, .. } = posterior(By::Default, cloud, &values, &at);
+        let Posterior { means, variances, .. } = posterior(self.by, cloud, &values, &at);
         let errors: Vec<f64> = means.iter().zip(at.points()).map(|(u, x)| u - field(x)).collect();
         let n_within = errors.iter().zip(&variances).filter(|(e, v)| e.abs() <= 1.96 * v.sqrt()).count();
         (n_within, errors.iter().map(|e| e * e).sum())

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::points::duplicates::{Merge, RowCopy};
+use gramian_numerics::points::duplicates::{Merge, RowCopy, row_copies};
 use gramian_numerics::points::sampling::Sampling as Spacings;
 use gramian_numerics::regression::function::interpolant::Interpolant;
 use gramian_numerics::regression::function::posterior::variances_with_mean;
@@ -142,7 +142,7 @@ fn chosen(by: By, cloud: &Cloud, values: &[f64]) -> Chosen {
     let (noise, mean) = (Noise::Unknown, Mean::Constant);
     let learned = learn(Observed { cloud, sampling: &sampling, values, noise, mean }, &Unobserved).unwrap();
     let By::Criterion(criterion) = by else {
-        let kernel = Kernel::new(learned.family, learned.length_scale, 1.0).unwrap();
+        let kernel = learned.kernel(1.0).unwrap();
         let has_place = learned.disagreement.is_some_and(|found| found.place.is_some());
         let Learned { ratio, variance, copies, .. } = learned;
         return Chosen { kernel, ratio, variance, has_place, copies };
@@ -156,8 +156,11 @@ fn chosen(by: By, cloud: &Cloud, values: &[f64]) -> Chosen {
         free(Parameter::Variance, 1e-3 * learned.variance, 1e3 * learned.variance),
         free(Parameter::Alpha, 1e-10 * learned.variance, 10.0 * learned.variance),
     ];
+    // As the service does where the noise is searched for.
+    let copies = row_copies(cloud, values);
+    let (without, merge) = Merge::copies(cloud, &copies);
     let selection = Selection {
-        observations: Observations { cloud, values, mean },
+        observations: Observations { cloud: &without, values: &merge.mean(values), mean },
         criterion,
         start: &start,
         vary: &vary,
@@ -172,5 +175,5 @@ fn chosen(by: By, cloud: &Cloud, values: &[f64]) -> Chosen {
     let kernel = Kernel::new(found.family, found.length_scales[0], 1.0).unwrap();
     // The least noise with which many points can be factorized.
     let ratio = (noise / found.variance).max(1e-10);
-    Chosen { kernel, ratio, variance: found.variance, has_place: false, copies: Vec::new() }
+    Chosen { kernel, ratio, variance: found.variance, has_place: false, copies }
 }

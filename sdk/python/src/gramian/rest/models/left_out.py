@@ -13,7 +13,7 @@ T = TypeVar("T", bound="LeftOut")
 
 @_attrs_define
 class LeftOut:
-    """Predictions of each value from all others.
+    """Predictions of each value from all others. A row that counts once with another has its prediction.
 
     Attributes:
         means (list[float | None]): The predictions, in the order of the points. Null where the mean is not determined
