@@ -31,8 +31,9 @@ class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
     """Gaussian-process regression by the service, which learns kernel, noise and mean from the values.
 
     Predictions have the shapes and the meaning of scikit-learn's `GaussianProcessRegressor`. If `y` has the
-    shape `[n, k]`, each column is fitted separately. Kernels depend on distances in X: scale features of
-    different units, or give a kernel with a length scale for each.
+    shape `[n, k]`, each column is fitted separately. Up to 2,000 samples of up to 16 features have a length
+    scale for each feature where `y` calls for that. Otherwise kernels depend on distances in X: scale features
+    of different units, or give a kernel with a length scale for each.
 
     Parameters
     ----------
