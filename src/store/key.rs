@@ -232,8 +232,12 @@ fn update_with_hyperparameters(hasher: &mut blake3::Hasher, known: &SurfaceHyper
         hasher,
         &[regression.noise, regression.bend_noise, length_scale, variance, *radius, *least_ratio],
     );
-    let mixtures =
-        [&regression.noise_ratios, &regression.flat_noise_ratios, &regression.quartic_noise_ratios];
+    let mixtures = [
+        &regression.noise_ratios,
+        &regression.rough_noise_ratios,
+        &regression.flat_noise_ratios,
+        &regression.quartic_noise_ratios,
+    ];
     mixtures.into_iter().for_each(|mixture| update_with_mixture(hasher, mixture));
     hasher.update(&[regression.coarser.len() as u8]);
     for level in &regression.coarser {

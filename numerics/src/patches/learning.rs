@@ -157,7 +157,7 @@ impl Patches {
             return Ok(());
         }
         let least = deviations(&self.finest.at(sites, &|_| true, true, observer)?, sites.dimension());
-        self.finest.quartic = self.finest.pooled(Kind::Quartic, sites, observer)?;
+        self.finest.quartic = self.finest.pooled(&[Kind::Quartic], sites, observer)?;
         let found = self.finest.at(sites, &|_| true, true, observer)?;
         if ratio(&deviations(&found, sites.dimension()), &least) < WORTH_OF_QUARTIC {
             self.kernel = self.finest.scales(&self.finest.quartic, sites, observer)?.kernel;
@@ -180,25 +180,31 @@ impl Level {
         if level.count < n_terms(sites.dimension()) + 2 {
             return Ok((level, Scales { noise: 0.0, kernel: PatchKernel::default() }));
         }
-        level.models = level.pooled(Kind::Plain, sites, observer)?;
+        // Means of points blur what jumps.
+        let is_of_means = level.support.points_per_mean() > 1;
+        let kinds = if is_of_means { &[Kind::Plain][..] } else { &[Kind::Plain, Kind::Rough] };
+        level.models = level.pooled(kinds, sites, observer)?;
+        // This is their order where hyperparameters are given.
+        level.models.sort_by_key(|of| Kind::Rough.describes(&of.model));
         let scales = level.scales(&level.models, sites, observer)?;
         if scales.noise > 0.0 {
-            level.stiff = level.pooled(Kind::Stiff, sites, observer)?;
+            level.stiff = level.pooled(&[Kind::Stiff], sites, observer)?;
         }
         Ok((level, scales))
     }
 
-    /// Returns the mixture of models of one kind that makes the neighbourhoods of these queries most likely.
+    /// Returns the mixture of models of these kinds that makes the neighbourhoods of queries most likely.
     fn pooled(
         &self,
-        kind: Kind,
+        kinds: &[Kind],
         queries: &Cloud,
         observer: &dyn Observer,
     ) -> Result<Vec<Weighted>, NumericsError> {
-        let candidates = kind.candidates();
+        let candidates: Vec<Model> = kinds.iter().flat_map(|kind| kind.candidates()).collect();
+        let least_share = kinds.iter().map(|kind| kind.least_share()).fold(0.0, f64::max);
         let found = self.krige_each(queries, &candidates, Purpose::Likelihood, observer)?;
         let logs = |(_, kriged): &Found| kriged.iter().map(|k| k.log_likelihood).collect();
-        Ok(pool(kind, &candidates, &found.iter().flatten().map(logs).collect::<Vec<Vec<f64>>>()))
+        Ok(pool(least_share, &candidates, &found.iter().flatten().map(logs).collect::<Vec<Vec<f64>>>()))
     }
 
     /// Returns noise and kernel of the heights by these models: medians over the sites.

@@ -33,8 +33,8 @@ use level::Level;
 pub use levels::{Agreement, N_BIASES};
 use means::Support;
 use neighbourhood::n_neighbours;
+use pooled::Kind;
 pub use pooled::MAX_MODELS;
-use pooled::{Kind, Weighted};
 
 pub use answers::{CurvatureDeviations, PatchGeometry};
 
@@ -56,6 +56,8 @@ pub struct NoiseRatio {
 pub struct PatchHyperparameters {
     /// Mixture of noise ratios, at most [`MAX_MODELS`]. Empty where nothing can be regressed.
     pub noise_ratios: Vec<NoiseRatio>,
+    /// Part of this mixture with a rougher process, for curvatures that jump. Its shares count with those.
+    pub rough_noise_ratios: Vec<NoiseRatio>,
     /// Mixture for the slopes where the surface is flat. Empty where there is no noise.
     pub flat_noise_ratios: Vec<NoiseRatio>,
     /// Mixture for a trend of fourth order. Empty where points have noise, or a quadric is as sure.
@@ -126,6 +128,7 @@ impl Patches {
         };
         let mut finest = over(1)?;
         finest.models = Kind::Plain.mixture(&hyperparameters.noise_ratios);
+        finest.models.extend(Kind::Rough.mixture(&hyperparameters.rough_noise_ratios));
         finest.stiff = Kind::Stiff.mixture(&hyperparameters.flat_noise_ratios);
         finest.quartic = Kind::Quartic.mixture(&hyperparameters.quartic_noise_ratios);
         let mut coarser = Vec::with_capacity(hyperparameters.coarser.len());
@@ -142,14 +145,15 @@ impl Patches {
     pub fn hyperparameters(&self) -> PatchHyperparameters {
         let of_level = |Coarser { level, agreement }: &Coarser| CoarserHyperparameters {
             points_per_mean: level.support.points_per_mean(),
-            noise_ratios: ratios(&level.models),
-            flat_noise_ratios: ratios(&level.stiff),
+            noise_ratios: Kind::Plain.ratios(&level.models),
+            flat_noise_ratios: Kind::Stiff.ratios(&level.stiff),
             agreement: agreement.clone(),
         };
         PatchHyperparameters {
-            noise_ratios: ratios(&self.finest.models),
-            flat_noise_ratios: ratios(&self.finest.stiff),
-            quartic_noise_ratios: ratios(&self.finest.quartic),
+            noise_ratios: Kind::Plain.ratios(&self.finest.models),
+            rough_noise_ratios: Kind::Rough.ratios(&self.finest.models),
+            flat_noise_ratios: Kind::Stiff.ratios(&self.finest.stiff),
+            quartic_noise_ratios: Kind::Quartic.ratios(&self.finest.quartic),
             coarser: self.coarser.iter().map(of_level).collect(),
             noise: self.noise,
             bend_noise: self.finest.bend_noise,
@@ -177,11 +181,6 @@ impl Patches {
         let of_level = |of: &Coarser| of.level.n_bytes() + of.agreement.n_bytes();
         self.finest.n_bytes() + vec_bytes(&self.coarser) + self.coarser.iter().map(of_level).sum::<usize>()
     }
-}
-
-fn ratios(models: &[Weighted]) -> Vec<NoiseRatio> {
-    let ratio = |of: &Weighted| NoiseRatio { ratio: of.model.noise, log_share: of.log_share };
-    models.iter().map(ratio).collect()
 }
 
 /// Returns the most points, or means, that a regression sees.

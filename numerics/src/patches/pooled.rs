@@ -23,6 +23,17 @@ const LENGTH_SCALE: f64 = 1.4;
 /// but noise (docs/error-bars.md).
 const STIFF: f64 = 4.0;
 
+/// Order of Matérn's kernel where curvatures jump, as beside fillets: ν = 5/2, whose paths have no third
+/// derivatives. Length scale ℓ in units of the radius of a neighbourhood.
+///
+/// With ν = 9/2 alone, what is within half a spacing of a jump is off by eight deviations. With a length
+/// scale of 1.4 this process is too smooth as well, and with 6 it says the same (docs/error-bars.md).
+const ROUGH_ORDER: u8 = 2;
+const ROUGH_LENGTH_SCALE: f64 = 3.0;
+
+/// Candidate ratios for this process. With more noise, nothing tells it from the smoother one.
+const ROUGH_NOISES: [f64; 5] = [0.0, 1e-8, 1e-6, 1e-4, 1e-3];
+
 /// Candidate ratios of the variance of the noise to that of the process.
 const NOISES: [f64; 12] = [0.0, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0];
 
@@ -32,7 +43,7 @@ const NOISES: [f64; 12] = [0.0, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 
 const LEAST_SHARE: f64 = 0.01;
 const LEAST_SHARE_OF_QUARTIC: f64 = 0.1;
 /// Greatest number of models kept.
-pub const MAX_MODELS: usize = 6;
+pub const MAX_MODELS: usize = 8;
 
 /// Number of expectation-maximization steps. Shares settle to a hundredth within some fifty.
 const STEPS: usize = 100;
@@ -49,7 +60,9 @@ pub(crate) struct Weighted {
 pub(crate) enum Kind {
     /// A quadric as the trend.
     Plain,
-    /// The same with the long length scale, [`STIFF`].
+    /// The same with a rougher process, for curvatures that jump.
+    Rough,
+    /// The same as plain with the long length scale, [`STIFF`].
     Stiff,
     /// A trend of fourth order.
     Quartic,
@@ -58,7 +71,8 @@ pub(crate) enum Kind {
 impl Kind {
     /// Candidates among which the likelihood decides.
     pub(crate) fn candidates(self) -> Vec<Model> {
-        NOISES.map(|noise| self.model(noise)).to_vec()
+        let noises = if self == Self::Rough { &ROUGH_NOISES[..] } else { &NOISES };
+        noises.iter().map(|&noise| self.model(noise)).collect()
     }
 
     /// The mixture with these noise ratios.
@@ -68,29 +82,42 @@ impl Kind {
         ratios.iter().map(of).collect()
     }
 
-    fn least_share(self) -> f64 {
+    pub(crate) fn describes(self, model: &Model) -> bool {
+        *model == self.model(model.noise)
+    }
+
+    /// The ratios of a mixture that belong to models of this kind.
+    pub(crate) fn ratios(self, models: &[Weighted]) -> Vec<NoiseRatio> {
+        let own = models.iter().filter(|of| self.describes(&of.model));
+        own.map(|of| NoiseRatio { ratio: of.model.noise, log_share: of.log_share }).collect()
+    }
+
+    /// Share of the neighbourhoods below which a model is dropped.
+    pub(crate) fn least_share(self) -> f64 {
         match self {
-            Self::Plain | Self::Stiff => LEAST_SHARE,
+            Self::Plain | Self::Rough | Self::Stiff => LEAST_SHARE,
             Self::Quartic => LEAST_SHARE_OF_QUARTIC,
         }
     }
 
     fn model(self, noise: f64) -> Model {
-        let (length_scale, trend) = match self {
-            Self::Plain => (LENGTH_SCALE, Trend::Quadric),
-            Self::Stiff => (STIFF, Trend::Quadric),
-            Self::Quartic => (LENGTH_SCALE, Trend::Quartic),
+        let (order, length_scale, trend) = match self {
+            Self::Plain => (ORDER, LENGTH_SCALE, Trend::Quadric),
+            Self::Rough => (ROUGH_ORDER, ROUGH_LENGTH_SCALE, Trend::Quadric),
+            Self::Stiff => (ORDER, STIFF, Trend::Quadric),
+            Self::Quartic => (ORDER, LENGTH_SCALE, Trend::Quartic),
         };
-        Model { family: Family::Matern { order: ORDER }, length_scale, noise, trend }
+        Model { family: Family::Matern { order }, length_scale, noise, trend }
     }
 }
 
-/// Finds the mixture of candidates of one kind that makes a sample of neighbourhoods most likely.
+/// Finds the mixture of candidates that makes a sample of neighbourhoods most likely. Those of less than a
+/// share are dropped.
 ///
 /// `log_likelihoods` is `[neighbourhoods][models]`. The shares come from expectation and maximization
 /// (nonparametric maximum likelihood: Laird 1978).
-pub(crate) fn pool(kind: Kind, candidates: &[Model], log_likelihoods: &[Vec<f64>]) -> Vec<Weighted> {
-    let (n, least_share) = (candidates.len(), kind.least_share());
+pub(crate) fn pool(least_share: f64, candidates: &[Model], log_likelihoods: &[Vec<f64>]) -> Vec<Weighted> {
+    let n = candidates.len();
     let shares = mixture_shares(n, log_likelihoods);
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|&a, &b| shares[b].total_cmp(&shares[a]));

@@ -17,15 +17,20 @@ use gramian_numerics::surface::local::SurfaceHyperparameters;
 #[serde(deny_unknown_fields)]
 pub struct Hyperparameters {
     /// Mixture of noise ratios. Empty where nothing can be regressed.
-    #[schema(max_items = 6)]
+    #[schema(max_items = 8)]
     pub noise_ratios: Vec<NoiseRatio>,
+    /// The part of this mixture with a rougher process, for curvatures that jump. Its shares count with those
+    /// of `noise_ratios`.
+    #[serde(default)]
+    #[schema(max_items = 8)]
+    pub rough_noise_ratios: Vec<NoiseRatio>,
     /// Mixture of noise ratios for normals where the surface is flat. Empty where there is no noise.
-    #[schema(max_items = 6)]
+    #[schema(max_items = 8)]
     pub flat_noise_ratios: Vec<NoiseRatio>,
     /// Mixture of noise ratios beside polynomials of fourth order. Empty where points have noise, or quadrics
     /// are as sure.
     #[serde(default)]
-    #[schema(max_items = 6)]
+    #[schema(max_items = 8)]
     pub quartic_noise_ratios: Vec<NoiseRatio>,
     /// Regressions over means of points, which are weighed with those over points at each place. Each
     /// level has twice as many points a mean as the one before, or more. Empty where points have no noise, or
@@ -65,10 +70,10 @@ pub struct MeansLevel {
     #[schema(minimum = 2)]
     pub points_per_mean: usize,
     /// Mixture of noise ratios.
-    #[schema(max_items = 6)]
+    #[schema(max_items = 8)]
     pub noise_ratios: Vec<NoiseRatio>,
     /// Mixture of noise ratios for normals where the surface is flat.
-    #[schema(max_items = 6)]
+    #[schema(max_items = 8)]
     pub flat_noise_ratios: Vec<NoiseRatio>,
     /// Shares of the places at which normals are off those over fewer points by 0, 0.1, 0.3, 1, 3, 10, 30,
     /// 100 and 1,000 times the variance that noise explains.
@@ -97,6 +102,7 @@ impl Hyperparameters {
         let SurfaceHyperparameters { regression, radius, least_ratio } = learned;
         Self {
             noise_ratios: reported(&regression.noise_ratios),
+            rough_noise_ratios: reported(&regression.rough_noise_ratios),
             flat_noise_ratios: reported(&regression.flat_noise_ratios),
             quartic_noise_ratios: reported(&regression.quartic_noise_ratios),
             means: regression.coarser.iter().map(MeansLevel::of).collect(),
@@ -133,6 +139,7 @@ impl Hyperparameters {
         }
         let regression = PatchHyperparameters {
             noise_ratios: ratios(&self.noise_ratios, "noise_ratios")?,
+            rough_noise_ratios: ratios(&self.rough_noise_ratios, "rough_noise_ratios")?,
             flat_noise_ratios: ratios(&self.flat_noise_ratios, "flat_noise_ratios")?,
             quartic_noise_ratios: ratios(&self.quartic_noise_ratios, "quartic_noise_ratios")?,
             coarser: levels(&self.means)?,

@@ -69,6 +69,8 @@ impl Model {
 }
 
 /// −8φ‴(0) of Matérn's kernel for ν = 9/2: φ‴ = −ν³ θ₁(0)/θ₄(0).
+///
+/// The third derivatives of the rougher process, ν = 5/2, have no variance. It counts with this one.
 const THIRD_DERIVATIVE: f64 = 8.0 * 4.5 * 4.5 * 4.5 / 105.0;
 
 /// Covariance of value, gradient and Hessian of g at one place, divided by s², `[p, p]`.
