@@ -15,6 +15,7 @@ const REASONS = {
   far_from_cloud: "far from the cloud",
   under_resolved: "too few points for so much curvature",
   ambiguous_side: "inside and outside are not clear",
+  edge: "two sheets meet at an edge",
   uncertain: "less certain than it seems",
 };
 
@@ -27,6 +28,7 @@ const MARKS = [
   [0.3, 0.2, 0.8],
   [0.6, 0.4, 0.2],
   [0.9, 0.2, 0.2],
+  [0.1, 0.6, 0.6],
 ];
 
 /**

@@ -51,6 +51,7 @@ mod refusals;
 mod repeated_rows;
 mod routes;
 mod settings;
+mod sharp_edges;
 mod solvers;
 mod spans;
 mod support;

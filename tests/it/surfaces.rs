@@ -342,9 +342,10 @@ async fn a_scan_has_normals_without_any_parameter() {
     assert!(quantile(0.5) <= 2.5, "median {}", quantile(0.5));
     assert!(quantile(0.95) <= 10.0, "95 % {}", quantile(0.95));
     assert!(quantile(1.0) < 90.0, "flipped {}", quantile(1.0));
-    // A tenth is flagged: ears, feet and folds, where regressions of 30 points do not know the normal to 0.4
-    // rad.
-    assert!(8 * flagged(&exact, "under_resolved").len() <= points.len());
+    // Nearly a fifth is flagged: ears, feet and folds, where regressions of 30 points do not know the normal
+    // to 0.4 rad. It was a tenth before the process beside jumps of curvature. Bars covered 87 % then, and
+    // cover 95 % now.
+    assert!(5 * flagged(&exact, "under_resolved").len() <= points.len());
     assert_eq!(codes(&exact["diagnostics"]), ["disagrees_with_neighbours"]);
     assert_eq!(exact["diagnostics"]["kernel"]["family"], "laplace");
 

@@ -60,7 +60,7 @@ async fn hyperparameters_out_of_range_are_refused_by_their_place() {
         (with("noise_ratios", json!([ratio(0.0, -1.0), ratio(-1.0, -1.0)])), "noise_ratios/1"),
         (with("flat_noise_ratios", json!([ratio(0.0, 1.0)])), "flat_noise_ratios/0"),
         (with("quartic_noise_ratios", json!([ratio(-1.0, 0.0)])), "quartic_noise_ratios/0"),
-        (with("noise_ratios", json!(vec![ratio(0.0, 0.0); 7])), "noise_ratios"),
+        (with("noise_ratios", json!(vec![ratio(0.0, 0.0); 9])), "noise_ratios"),
     ];
     for (body, member) in cases {
         let problem = server.post("/v1/normals", &body).await.expect_problem(422, "invalid-request");

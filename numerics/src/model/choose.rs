@@ -35,6 +35,8 @@ pub enum AutoReason {
     ManyPoints,
     /// Standard deviations are requested, which only regressions have.
     Deviations,
+    /// The normals of both sheets at sharp edges are requested, which only regressions find.
+    EdgeNormals,
     /// The level set of a finely sampled curve is requested.
     FineCurve,
     /// The mesh of a surface is requested.
@@ -85,15 +87,16 @@ pub struct UnfittedSurface {
     pub n_points: usize,
     pub dimension: usize,
     pub purpose: Purpose,
-    pub has_deviations: bool,
+    /// What is requested that only regressions have, if anything is.
+    pub only_regressed: Option<AutoReason>,
 }
 
 /// Returns why a surface is better regressed locally, or `None` if it is not.
 pub fn prefers_local(surface: &UnfittedSurface, max_dense_points: usize) -> Option<AutoReason> {
-    let UnfittedSurface { n_points, dimension, purpose, has_deviations } = *surface;
+    let UnfittedSurface { n_points, dimension, purpose, only_regressed } = *surface;
     match dimension {
         2..=MAX_LOCAL_DIMENSION if n_points > max_dense_points => Some(AutoReason::BeyondDense),
-        2..=MAX_LOCAL_DIMENSION if has_deviations => Some(AutoReason::Deviations),
+        2..=MAX_LOCAL_DIMENSION if only_regressed.is_some() => only_regressed,
         2..=MAX_LOCAL_DIMENSION if n_points >= LOCAL_FROM => Some(AutoReason::ManyPoints),
         2 if purpose == Purpose::LevelSets && n_points >= LOCAL_CURVES_FROM => Some(AutoReason::FineCurve),
         3 if purpose == Purpose::LevelSets && n_points >= LOCAL_MESHES_FROM => Some(AutoReason::Mesh),

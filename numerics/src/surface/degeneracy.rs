@@ -29,6 +29,9 @@ pub enum DegeneracyReason {
     /// The normal is served, but may point inward. The winding number of the oriented points is not ½ there,
     /// or the neighbours point to the other side.
     AmbiguousSide,
+    /// The query is at a sharp edge, and its normal is that of one of the two sheets that meet there, or of
+    /// neither.
+    Edge,
 }
 
 impl DegeneracyReason {
@@ -36,7 +39,11 @@ impl DegeneracyReason {
     pub fn is_null(self) -> bool {
         match self {
             Self::VanishingGradient | Self::UnaffordableRescue => true,
-            Self::KernelTooRough | Self::FarFromCloud | Self::UnderResolved | Self::AmbiguousSide => false,
+            Self::KernelTooRough
+            | Self::FarFromCloud
+            | Self::UnderResolved
+            | Self::AmbiguousSide
+            | Self::Edge => false,
         }
     }
 }

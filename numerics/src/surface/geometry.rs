@@ -6,7 +6,7 @@ use super::Surface;
 use super::curvature::{principal_curvatures, tangential_trace};
 use super::degeneracy::{Degeneracy, DegeneracyReason, Resolution, is_far};
 pub use super::request::{GeometryRequest, Orientation, SurfaceModel};
-use super::served::{Deviations, Served, ServedBy};
+use super::served::{Deviations, Edge, Served, ServedBy};
 use crate::error::{NumericsError, Result};
 use crate::machine::vector::norm;
 use crate::observer::Observer;
@@ -138,6 +138,11 @@ impl Geometry {
     /// Standard deviations, if they were asked for.
     pub fn deviations(&self) -> Option<&Deviations> {
         self.served.deviations.as_ref()
+    }
+
+    /// Queries at sharp edges with the normals of both sheets, ascending. Local regressions alone find them.
+    pub fn edges(&self) -> &[Edge] {
+        &self.served.edges
     }
 
     /// Values of u at the queries, `[m]`: 1 on the surface at α = 0.

@@ -35,6 +35,8 @@ pub struct GeometryRequest {
     pub max_offsets: usize,
     /// True if standard deviations are asked for.
     pub has_deviations: bool,
+    /// True if the normals of both sheets at sharp edges are asked for, which only regressions find.
+    pub has_edge_normals: bool,
 }
 
 impl GeometryRequest {
@@ -45,5 +47,6 @@ impl GeometryRequest {
         checks_curvatures: true,
         max_offsets: usize::MAX,
         has_deviations: false,
+        has_edge_normals: false,
     };
 }

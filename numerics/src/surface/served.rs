@@ -28,6 +28,14 @@ pub struct Deviations {
     pub gaussian: Vec<f64>,
 }
 
+/// An edge at a query.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Edge {
+    pub query: usize,
+    /// Unit normals of the two sheets, `[2, d]`, first that of the own sheet of the query, if it has one.
+    pub normals: Vec<f64>,
+}
+
 /// Geometry of the surface at m queries, in flat arrays.
 pub(crate) struct Served {
     pub(super) dimension: usize,
@@ -39,6 +47,8 @@ pub(crate) struct Served {
     /// Values of u, `[m]`.
     pub(super) levels: Vec<f64>,
     pub(super) deviations: Option<Deviations>,
+    /// Queries at sharp edges, ascending, where regressions serve them.
+    pub(super) edges: Vec<Edge>,
 }
 
 /// Sign, model and degeneracy of a query.

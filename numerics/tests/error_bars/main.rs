@@ -4,6 +4,7 @@
 mod common;
 
 mod carved;
+mod edges;
 mod exact;
 mod jet;
 mod machined;

@@ -22,6 +22,7 @@ use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, Orientation
 use support::{OPTIONS, angles, assert_is_manifold, bunny, local, meshed, spacing_of, volume};
 
 const WITH_DEVIATIONS: GeometryRequest = GeometryRequest {
+    has_edge_normals: false,
     orientation: Orientation::Outward,
     model: SurfaceModel::Auto,
     checks_curvatures: false,

@@ -94,6 +94,7 @@ impl Surface {
             checks_curvatures: self.model == SurfaceModel::Auto,
             max_offsets: usize::MAX,
             has_deviations: false,
+            has_edge_normals: false,
         };
         Geometry::of(&self.surface, queries, &request, &Unobserved).unwrap()
     }

@@ -119,4 +119,6 @@ pub enum ValuesInclude {
 pub enum GeometryInclude {
     /// Standard deviations.
     Deviations,
+    /// The normals of both sheets at sharp edges. Takes local regressions.
+    EdgeNormals,
 }

@@ -86,6 +86,8 @@ pub enum WarningCode {
     DisagreesWithNeighbours,
     /// Queries lie far from the cloud.
     FarFromCloud,
+    /// Queries are at sharp edges, where two sheets of the surface meet.
+    SharpEdges,
     /// Values from the points nearest to a query still change with the number of points used.
     NeighboursNotEnough,
     /// Regular triangles would have changed the topology of a mesh, so it has the raw ones.
@@ -280,6 +282,9 @@ pub enum DegenerateReason {
     UnderResolved,
     /// Evidence about the outward side is contradictory. The normal is served, and may point inward.
     AmbiguousSide,
+    /// Two sheets of the surface meet here at a sharp edge. What is served is that of one of them, or of
+    /// neither.
+    Edge,
     /// The number is served, but is uncertain or depends on derivatives that the kernel lacks.
     ///
     /// Uncertain means that its error, as estimated from the values, exceeds a fifth of the root mean square

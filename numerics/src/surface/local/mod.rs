@@ -1,31 +1,28 @@
 //! The surface made of local regressions, with one side chosen for all of it.
 
 pub mod coarse;
+mod edges;
+mod rows;
 mod runs;
+mod serving;
 pub(crate) mod smoothed;
 pub mod sure;
 mod tree_order;
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::NearNormals;
 use super::curvature::{FLAT, principal_curvatures};
-use super::degeneracy::{DegeneracyReason, is_far};
-use super::request::{GeometryRequest, Orientation};
-use super::served::{Deviations, Served, ServedBy, Verdict};
 use crate::error::NumericsError;
 use crate::machine::heap::{arc_payload, block_bytes, vec_bytes};
 use crate::machine::vector::{dot, norm};
 use crate::observer::{Observer, Stage};
 use crate::orientation::tiles::{LabelledRegions, Signed, Tile, regions_of};
 use crate::orientation::{Directions, Oriented, Sampled, SurfaceOrientation};
-use crate::patches::{CurvatureDeviations, PatchGeometry, PatchHyperparameters, Patches};
+use crate::patches::{PatchGeometry, PatchHyperparameters, Patches};
 use crate::points::cloud::Cloud;
 use crate::points::neighbourhoods::Neighbourhoods;
-use crate::points::neighbours::Neighbour;
 use crate::points::sampling::Sampling;
 use coarse::outward_directions;
 use smoothed::{Placed, Smoothed};
@@ -35,10 +32,6 @@ use tree_order::TreeOrder;
 /// Cosine between a normal and the gradient of the coarse function above which the sign of the normal is
 /// known.
 const SAYS_SIGN: f64 = 0.2;
-
-/// Deviation of a normal, radians, beyond which it is flagged. On a scan this flags a fiftieth of the points,
-/// among them seven tenths of the normals that are off by 30°.
-const UNCERTAIN_NORMAL: f64 = 0.3;
 
 /// Hyperparameters of a surface by local regressions, learned of the whole cloud.
 ///
@@ -260,101 +253,6 @@ impl LocalSurface {
             + vec_bytes(&self.is_ambiguous)
             + block_bytes(arc_payload::<Self>())
     }
-
-    /// Serves the geometry at queries, as that of a function with |∇u| = 1 that grows outward.
-    ///
-    /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(super) fn serve(
-        &self,
-        queries: &Cloud,
-        request: &GeometryRequest,
-        observer: &dyn Observer,
-    ) -> Result<Served, NumericsError> {
-        observer.enter(Stage::Evaluate);
-        let are_points = *queries == *self.cloud;
-        let (geometry, of_sides) = match are_points {
-            true => (self.at_points.given(&self.ordered), self.doubts_of_points()),
-            false => {
-                let are_points = self.ordered().sampling.neighbours().hold(queries);
-                let mut geometry = self.patches.at(queries, &|query| are_points[query], true, observer)?;
-                self.turn_outward(queries, &mut geometry);
-                (geometry, self.doubts_of_sides(queries))
-            }
-        };
-        let (m, d) = (queries.n_points(), queries.dimension());
-        let sign = match request.orientation {
-            Orientation::Outward => 1.0,
-            // Signature functions grow inward.
-            Orientation::Gradient => -1.0,
-        };
-        let verdict = |query: usize| {
-            let reason = self.reason(&geometry, query, request, of_sides[query]);
-            Verdict { sign, by: ServedBy::Local, reason }
-        };
-        Ok(Served {
-            dimension: d,
-            verdicts: (0..m).into_par_iter().map(verdict).collect(),
-            levels: geometry.heights.iter().map(|height| 1.0 - height).collect(),
-            deviations: request.has_deviations.then(|| deviations(&geometry, sign, d)),
-            gradients: geometry.normals,
-            hessians: geometry.shapes,
-        })
-    }
-
-    /// Whether the sides of the given points are in doubt, `[n]`.
-    fn doubts_of_points(&self) -> Vec<Option<DegeneracyReason>> {
-        let doubt = |&is: &bool| is.then_some(DegeneracyReason::AmbiguousSide);
-        self.ordered.given_rows(&self.is_ambiguous.iter().map(doubt).collect::<Vec<_>>(), 1)
-    }
-
-    /// Whether the sides of other places are in doubt, `[m]`, which they have from the nearest point.
-    fn doubts_of_sides(&self, places: &Cloud) -> Vec<Option<DegeneracyReason>> {
-        let Placed { sampling, .. } = self.ordered();
-        let doubt = |found: &mut Vec<Neighbour>, place: usize| {
-            sampling.neighbours().nearest_into(places.point(place), 1, found);
-            let is_near = |found: &&Neighbour| !is_far(found.squared_distance, sampling.spacing(found.point));
-            match found.first().filter(is_near) {
-                None => Some(DegeneracyReason::FarFromCloud),
-                Some(found) => self.is_ambiguous[found.point].then_some(DegeneracyReason::AmbiguousSide),
-            }
-        };
-        (0..places.n_points()).into_par_iter().map_init(Vec::new, doubt).collect()
-    }
-
-    /// Why an answer is null or doubtful, if it is. `of_side` says whether its side is in doubt.
-    fn reason(
-        &self,
-        geometry: &PatchGeometry,
-        query: usize,
-        request: &GeometryRequest,
-        of_side: Option<DegeneracyReason>,
-    ) -> Option<DegeneracyReason> {
-        if !geometry.is_known[query] {
-            return Some(DegeneracyReason::VanishingGradient);
-        }
-        let is_resolved = match request.checks_curvatures {
-            true => self.is_resolved(geometry, query),
-            false => geometry.normal_deviations[query] <= UNCERTAIN_NORMAL,
-        };
-        of_side.or_else(|| (!is_resolved).then_some(DegeneracyReason::UnderResolved))
-    }
-
-    /// Returns whether the curvatures are known well enough to be used: to a part of their size, or to be
-    /// those of a plane as far as the neighbourhood reaches.
-    fn is_resolved(&self, geometry: &PatchGeometry, query: usize) -> bool {
-        let ratio = ratio(geometry, query, self.cloud.dimension(), self.radius);
-        is_flat(geometry, query) || ratio.is_some_and(|ratio| ratio >= self.least_ratio)
-    }
-
-    /// Turns normals to the side of the normals of nearby points.
-    fn turn_outward(&self, queries: &Cloud, geometry: &mut PatchGeometry) {
-        let mut found = Vec::new();
-        geometry.turn(|query, normal| {
-            let near = NearNormals { sampling: &self.ordered.sampling, normals: &self.at_points.normals };
-            if near.along(queries.point(query), normal, &mut found) < 0.0 { -1.0 } else { 1.0 }
-        });
-    }
 }
 
 /// Returns whether the surface is surely flat in the neighbourhood.
@@ -412,99 +310,12 @@ fn turn_along(normal: &mut [f64], direction: &[f64]) -> bool {
     along.abs() > SAYS_SIGN * norm(direction)
 }
 
-/// Returns deviations in the order of the curvatures for normals of this sign.
-fn deviations(geometry: &PatchGeometry, sign: f64, d: usize) -> Deviations {
-    let empty = CurvatureDeviations::default();
-    let curvatures = geometry.curvatures.as_ref().unwrap_or(&empty);
-    let mut principal = curvatures.principal.clone();
-    if sign < 0.0 {
-        principal.chunks_exact_mut(d - 1).for_each(<[f64]>::reverse);
-    }
-    Deviations {
-        is_known: geometry.is_known.clone(),
-        height: geometry.height_deviations.clone(),
-        normal: geometry.normal_deviations.clone(),
-        principal,
-        mean: curvatures.mean.clone(),
-        gaussian: curvatures.gaussian.clone(),
-    }
-}
-
-impl PatchGeometry {
-    /// Flips the normals whose `sign` is negative, with everything that changes sign with them.
-    fn turn(&mut self, mut sign: impl FnMut(usize, &[f64]) -> f64) {
-        let m = self.is_known.len();
-        let d = self.normals.len() / m.max(1);
-        for query in 0..m {
-            if !self.is_known[query] || sign(query, &self.normals[query * d..][..d]) > 0.0 {
-                continue;
-            }
-            self.normals[query * d..][..d].iter_mut().for_each(|c| *c = -*c);
-            self.shapes[query * d * d..][..d * d].iter_mut().for_each(|c| *c = -*c);
-            self.heights[query] = -self.heights[query];
-            if let Some(curvatures) = &mut self.curvatures {
-                curvatures.principal[query * (d - 1)..][..d - 1].reverse();
-            }
-        }
-    }
-
-    /// The feet `x − hν` of some points of the cloud that this is the geometry at, `[m, d]`. Points without a
-    /// regression stay where they are.
-    pub(crate) fn feet(&self, cloud: &Cloud, points: Range<usize>) -> Vec<f64> {
-        let d = cloud.dimension();
-        let foot = |point: usize| {
-            let (normal, height) = (&self.normals[point * d..][..d], self.heights[point]);
-            cloud.point(point).iter().zip(normal).map(move |(x, c)| x - height * c)
-        };
-        points.flat_map(foot).collect()
-    }
-
-    /// The same of ordered points in the order in which they were given.
-    fn given(&self, ordered: &TreeOrder) -> Self {
-        let d = ordered.cloud.dimension();
-        let curvatures = self.curvatures.as_ref().map(|own| CurvatureDeviations {
-            principal: ordered.given_rows(&own.principal, d - 1),
-            mean: ordered.given_rows(&own.mean, 1),
-            gaussian: ordered.given_rows(&own.gaussian, 1),
-            is_bent: ordered.given_rows(&own.is_bent, 1),
-            is_flat: ordered.given_rows(&own.is_flat, 1),
-        });
-        Self {
-            is_known: ordered.given_rows(&self.is_known, 1),
-            normals: ordered.given_rows(&self.normals, d),
-            shapes: ordered.given_rows(&self.shapes, d * d),
-            is_at_rim: ordered.given_rows(&self.is_at_rim, 1),
-            heights: ordered.given_rows(&self.heights, 1),
-            height_deviations: ordered.given_rows(&self.height_deviations, 1),
-            normal_deviations: ordered.given_rows(&self.normal_deviations, 1),
-            curvatures,
-        }
-    }
-
-    /// Bytes held on the heap.
-    fn n_bytes(&self) -> usize {
-        let vectors = [&self.normals, &self.shapes];
-        let numbers = [&self.heights, &self.height_deviations, &self.normal_deviations];
-        let of_curvatures = |c: &CurvatureDeviations| {
-            vec_bytes(&c.principal)
-                + vec_bytes(&c.mean)
-                + vec_bytes(&c.gaussian)
-                + vec_bytes(&c.is_bent)
-                + vec_bytes(&c.is_flat)
-        };
-        vectors.into_iter().chain(numbers).map(vec_bytes).sum::<usize>()
-            + vec_bytes(&self.is_known)
-            + vec_bytes(&self.is_at_rim)
-            + self.curvatures.as_ref().map_or(0, of_curvatures)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::observer::Unobserved;
     use crate::surface::Surface;
-    use crate::surface::geometry::Geometry;
+    use crate::surface::geometry::{Geometry, GeometryRequest};
     use crate::testing::fibonacci_sphere;
 
     fn geometry(cloud: Cloud) -> Geometry {

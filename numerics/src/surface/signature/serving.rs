@@ -162,7 +162,8 @@ impl Service<'_> {
             },
         )?;
         let levels = self.jets.values();
-        let mut served = Served { dimension: d, gradients, hessians, verdicts, levels, deviations: None };
+        let (deviations, edges) = (None, Vec::new());
+        let mut served = Served { dimension: d, gradients, hessians, verdicts, levels, deviations, edges };
         if !self.request.checks_curvatures {
             self.flag_normals(&mut served, observer)?;
         }

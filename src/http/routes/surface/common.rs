@@ -39,7 +39,8 @@ pub fn plan_geometry(
     check_is_surface(&main.on.stored.cloud)?;
     let queries = planner.queries(queries, &mut main.on)?;
     let (m, d) = (queries.n_points(), queries.dimension());
-    let n_numbers = planner.check_answer(m.checked_mul(numbers_per_query(d)))?;
+    let of_edges = if request.has_edge_normals { 2 * d } else { 0 };
+    let n_numbers = planner.check_answer(m.checked_mul(numbers_per_query(d) + of_edges))?;
     let sizes = Sizes { n_points: main.on.n_points(), n_queries: m, dimension: d };
     let work = geometry_price(main.solver(), asked_of(&request, &main, &queries), sizes);
     let cost = Cost { work, n_numbers, n_held: m * d };
@@ -53,6 +54,7 @@ pub fn geometry_request(
     checks_curvatures: bool,
     include: Option<&[GeometryInclude]>,
 ) -> GeometryRequest {
+    let has = |part| include.is_some_and(|include| include.contains(&part));
     GeometryRequest {
         orientation: match orientation.unwrap_or_default() {
             OrientationChoice::Outward => Orientation::Outward,
@@ -66,7 +68,8 @@ pub fn geometry_request(
         },
         checks_curvatures,
         max_offsets: MAX_OFFSETS,
-        has_deviations: include.is_some_and(|include| include.contains(&GeometryInclude::Deviations)),
+        has_deviations: has(GeometryInclude::Deviations),
+        has_edge_normals: has(GeometryInclude::EdgeNormals),
     }
 }
 

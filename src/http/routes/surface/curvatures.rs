@@ -68,6 +68,8 @@ answer! {
         mean_curvature_deviations: Option<Array> as Option<Vec<Option<f64>>>,
         /// Standard deviations of the Gaussian curvatures, 1/length to the d − 1.
         gaussian_curvature_deviations: Option<Array> as Option<Vec<Option<f64>>>,
+        /// The normals of the two sheets that meet at each query, if it is at a sharp edge. Null elsewhere.
+        edge_normals: Option<Array> as Option<Vec<Option<Vec<Vec<f64>>>>>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,
         /// The numbers used, the method, its accuracy, and warnings.
@@ -125,6 +127,7 @@ impl Operation for CurvaturesRequest {
             gradient_norms: Array::new(geometry.gradient_norms().to_vec(), &[m]),
             levels: Array::new(geometry.levels().to_vec(), &[m]),
             surfaces: surface.surfaces(),
+            edge_normals: surface.edge_normals(),
             degenerate: surface.degenerate(),
             normal_deviations: normal,
             principal_curvature_deviations: principal,

@@ -58,6 +58,8 @@ answer! {
         /// 95 % of the angles lie within 1.96 standard deviations. Null where there is no answer or the
         /// deviation is not known.
         normal_deviations: Option<Array> as Option<Vec<Option<f64>>>,
+        /// The normals of the two sheets that meet at each query, if it is at a sharp edge. Null elsewhere.
+        edge_normals: Option<Array> as Option<Vec<Option<Vec<Vec<f64>>>>>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,
         /// The numbers used, the method, its accuracy, and warnings.
@@ -98,6 +100,7 @@ impl Operation for NormalsRequest {
             gradient_norms: Array::new(geometry.gradient_norms().to_vec(), &[m]),
             levels: Array::new(geometry.levels().to_vec(), &[m]),
             surfaces: surface.surfaces(),
+            edge_normals: surface.edge_normals(),
             degenerate: surface.degenerate(),
             normal_deviations: surface.deviations().map(|deviations| deviations.normal),
             diagnostics: surface.diagnostics(fits),

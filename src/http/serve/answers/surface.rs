@@ -67,6 +67,7 @@ impl SurfaceGeometry {
                 DegeneracyReason::FarFromCloud => DegenerateReason::FarFromCloud,
                 DegeneracyReason::UnderResolved => DegenerateReason::UnderResolved,
                 DegeneracyReason::AmbiguousSide => DegenerateReason::AmbiguousSide,
+                DegeneracyReason::Edge => DegenerateReason::Edge,
             },
             gradient_norm: d.gradient_norm,
         };
@@ -153,6 +154,21 @@ impl SurfaceGeometry {
         })
     }
 
+    /// Normals of both sheets at the queries that are at an edge, `[m, 2, d]`, null elsewhere. `None` unless
+    /// they were asked for.
+    pub fn edge_normals(&self) -> Option<Array> {
+        if !self.request.has_edge_normals {
+            return None;
+        }
+        let (m, d) = (self.geometry.n_queries(), self.geometry.dimension());
+        let (mut normals, mut is_null) = (vec![0.0; m * 2 * d], vec![true; m]);
+        for edge in self.geometry.edges() {
+            normals[edge.query * 2 * d..][..2 * d].copy_from_slice(&edge.normals);
+            is_null[edge.query] = false;
+        }
+        Some(Array::new(normals, &[m, 2, d]).with_nulls(0, &is_null))
+    }
+
     /// Warnings about repairs, and counts of the flags of single queries.
     fn warnings(&self) -> Vec<Warning> {
         let (m, n) = (self.geometry.n_queries(), self.surface.cloud().n_points());
@@ -168,6 +184,7 @@ impl SurfaceGeometry {
             (flagged(DegeneracyReason::KernelTooRough), WarningCode::KernelTooRough, too_rough),
             (flagged(DegeneracyReason::UnderResolved), WarningCode::DisagreesWithNeighbours, disagrees),
             (flagged(DegeneracyReason::FarFromCloud), WarningCode::FarFromCloud, FAR),
+            (flagged(DegeneracyReason::Edge), WarningCode::SharpEdges, EDGES),
         ];
         let counted = counted.into_iter().filter(|(count, ..)| *count > 0);
         let mut warnings: Vec<Warning> = counted
@@ -196,5 +213,6 @@ const KERNEL_TOO_ROUGH: &str = "curvatures see the cusp of the kernel at the poi
 const DISAGREES: &str = "curvatures are not confirmed by the points around them; see degenerate";
 const UNCERTAIN: &str = "normals are uncertain by 17 degrees or more; see degenerate";
 const FAR: &str = "farther from the cloud than three spacings";
+const EDGES: &str = "at a sharp edge, where two sheets meet; include edge_normals for the normals of both";
 const OPEN_CLOUD: &str =
     "the cloud has a rim, so outward is undefined; normals take the side of most gradients";

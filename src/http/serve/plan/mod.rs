@@ -106,6 +106,7 @@ pub fn words(reason: AutoReason) -> &'static str {
         AutoReason::BeyondDense => "the cloud has more points than a dense factorization may have",
         AutoReason::ManyPoints => "local regressions take time linear in the points, and this cloud is large",
         AutoReason::Deviations => "standard deviations come from local regressions",
+        AutoReason::EdgeNormals => "the normals of both sides of an edge come from local regressions",
         AutoReason::FewLandmarks => "few landmarks span the kernels of all points",
         AutoReason::Tolerance => {
             "the cloud has more points than a dense factorization may have, and the request names a tolerance"

@@ -7,6 +7,7 @@ use crate::http::problem::{catalogue, from_numerics};
 use crate::http::serve::plan::FittedCloud;
 use gramian_host::wire::read::points::Points;
 use gramian_numerics::error::SolverKind;
+use gramian_numerics::patches::MAX_LOCAL_DIMENSION;
 use gramian_numerics::regression::solver::trend::Mean;
 use gramian_numerics::regression::solver::{DEFAULT_TOLERANCE, TOLERANCES};
 use gramian_numerics::regression::sums::regularization::Regularization;
@@ -54,6 +55,15 @@ pub(super) fn only_local_learns(member: &str) -> Problem {
     let detail =
         format!("only local regressions take {member}: leave them out, or set \"solver\": \"local\"");
     Problem::of_field(catalogue::UNSUPPORTED_BY_SOLVER, format!("/{member}"), detail)
+}
+
+/// Returns 422 for the normals of edges at the surface of another solver.
+pub(super) fn only_local_finds_edges() -> Problem {
+    let detail = format!(
+        "only local regressions, in dimensions 2 to {MAX_LOCAL_DIMENSION}, find the normals of both sides of an edge: leave \
+         out edge_normals, or set \"solver\": \"local\" without kernel and noise"
+    );
+    Problem::of_field(catalogue::UNSUPPORTED_BY_SOLVER, "/include", detail)
 }
 
 /// Returns the tolerance of a request.

@@ -18,8 +18,8 @@ use crate::store::clouds::RegisteredCloud;
 use crate::store::key::{CloudId, GivenKernel, ValuesKey};
 pub use choice::Restricted;
 use choice::{
-    FitOptions, TRY_LOCAL, checked_tolerance, local_lacks_operators, only_local_learns, pointers_of,
-    pointers_of_surface,
+    FitOptions, TRY_LOCAL, checked_tolerance, local_lacks_operators, only_local_finds_edges,
+    only_local_learns, pointers_of, pointers_of_surface,
 };
 use gramian_host::memory::Owner;
 use gramian_numerics::error::SolverKind;
@@ -184,11 +184,20 @@ impl<'a> Planner<'a> {
             }
             return Ok(Regressed::Locally(None));
         }
-        if options.solver != SolverChoice::Auto || request.model != SurfaceModel::Auto || given.is_some() {
+        let is_named =
+            options.solver != SolverChoice::Auto || request.model != SurfaceModel::Auto || given.is_some();
+        if request.has_edge_normals && (is_named || dimension > MAX_LOCAL_DIMENSION) {
+            return Err(only_local_finds_edges());
+        }
+        if is_named {
             return Ok(Regressed::No);
         }
-        let has_deviations = request.has_deviations;
-        let surface = UnfittedSurface { n_points, dimension, purpose, has_deviations };
+        let only_regressed = match (request.has_edge_normals, request.has_deviations) {
+            (true, _) => Some(AutoReason::EdgeNormals),
+            (false, true) => Some(AutoReason::Deviations),
+            (false, false) => None,
+        };
+        let surface = UnfittedSurface { n_points, dimension, purpose, only_regressed };
         Ok(match prefers_local(&surface, self.app.config.max_dense_points) {
             None => Regressed::No,
             reason => Regressed::Locally(reason),

@@ -81,6 +81,8 @@ class Normals(SurfaceAnswer):
     normal_deviations
         `[m]`, radians. Standard deviation σ of the angle of the normal: 95 % of the angles are below 1.96 σ.
         NaN where it is unknown.
+    edge_normals
+        `[m, 2, d]`. Normals of the two sheets at queries on a sharp edge, NaN elsewhere. None unless requested.
     degenerate
         The queries without a normal, or with a doubtful one.
     diagnostics
@@ -94,6 +96,7 @@ class Normals(SurfaceAnswer):
     levels: Array
     surfaces: tuple[SurfaceUsed, ...]
     normal_deviations: Array | None = None
+    edge_normals: Array | None = None
     degenerate: tuple[Degenerate, ...]
     diagnostics: Diagnostics
     fit: SurfaceFit
@@ -133,6 +136,8 @@ class Curvatures(SurfaceAnswer):
         `[m]`, 1/L. Standard deviations of the mean curvatures.
     gaussian_curvature_deviations
         `[m]`, 1/L^(d − 1). Standard deviations of the Gaussian curvatures.
+    edge_normals
+        `[m, 2, d]`. Normals of the two sheets at queries on a sharp edge, NaN elsewhere. None unless requested.
     degenerate
         The queries without curvatures, or with doubtful ones.
     diagnostics
@@ -153,6 +158,7 @@ class Curvatures(SurfaceAnswer):
     principal_curvature_deviations: Array | None = None
     mean_curvature_deviations: Array | None = None
     gaussian_curvature_deviations: Array | None = None
+    edge_normals: Array | None = None
     degenerate: tuple[Degenerate, ...]
     diagnostics: Diagnostics
     fit: SurfaceFit

@@ -67,7 +67,7 @@ class DeviationOptions(TypedDict, total=False):
     Keys
     ----
     include : str or several, optional
-        Additional results: `"deviations"`. Nothing if absent.
+        Additional results: `"deviations"`, and of normals and curvatures `"edge_normals"`. Nothing if absent.
     deviations : bool, optional
         True for standard deviations, as by `include="deviations"`. Those of normals and curvatures come from
         local regressions, unless `kernel`, `alpha`, `surface` or `solver` say otherwise.

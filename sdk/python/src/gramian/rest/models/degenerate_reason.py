@@ -3,6 +3,7 @@ from enum import StrEnum
 
 class DegenerateReason(StrEnum):
     AMBIGUOUS_SIDE = "ambiguous_side"
+    EDGE = "edge"
     FAR_FROM_CLOUD = "far_from_cloud"
     KERNEL_TOO_ROUGH = "kernel_too_rough"
     UNAFFORDABLE_RESCUE = "unaffordable_rescue"

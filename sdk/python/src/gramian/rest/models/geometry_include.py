@@ -3,6 +3,7 @@ from enum import StrEnum
 
 class GeometryInclude(StrEnum):
     DEVIATIONS = "deviations"
+    EDGE_NORMALS = "edge_normals"
 
     def __str__(self) -> str:
         return str(self.value)

@@ -30,6 +30,9 @@ class Hyperparameters:
             variance (float): Variance of these heights, length squared.
             radius (float): Half the diagonal of the bounding box of the cloud, length. Beside it, small curvatures count as
                 0.
+            rough_noise_ratios (list[NoiseRatio] | Unset): The part of this mixture with a rougher process, for curvatures
+                that jump. Its shares count with those
+                of `noise_ratios`.
             quartic_noise_ratios (list[NoiseRatio] | Unset): Mixture of noise ratios beside polynomials of fourth order.
                 Empty where points have noise, or quadrics
                 are as sure.
@@ -51,6 +54,7 @@ class Hyperparameters:
     length_scale: float
     variance: float
     radius: float
+    rough_noise_ratios: list[NoiseRatio] | Unset = UNSET
     quartic_noise_ratios: list[NoiseRatio] | Unset = UNSET
     means: list[MeansLevel] | Unset = UNSET
     bend_noise_deviation: float | Unset = UNSET
@@ -76,6 +80,13 @@ class Hyperparameters:
         variance = self.variance
 
         radius = self.radius
+
+        rough_noise_ratios: list[dict[str, Any]] | Unset = UNSET
+        if not isinstance(self.rough_noise_ratios, Unset):
+            rough_noise_ratios = []
+            for rough_noise_ratios_item_data in self.rough_noise_ratios:
+                rough_noise_ratios_item = rough_noise_ratios_item_data.to_dict()
+                rough_noise_ratios.append(rough_noise_ratios_item)
 
         quartic_noise_ratios: list[dict[str, Any]] | Unset = UNSET
         if not isinstance(self.quartic_noise_ratios, Unset):
@@ -107,6 +118,8 @@ class Hyperparameters:
                 "radius": radius,
             }
         )
+        if rough_noise_ratios is not UNSET:
+            field_dict["rough_noise_ratios"] = rough_noise_ratios
         if quartic_noise_ratios is not UNSET:
             field_dict["quartic_noise_ratios"] = quartic_noise_ratios
         if means is not UNSET:
@@ -146,6 +159,15 @@ class Hyperparameters:
 
         radius = d.pop("radius")
 
+        _rough_noise_ratios = d.pop("rough_noise_ratios", UNSET)
+        rough_noise_ratios: list[NoiseRatio] | Unset = UNSET
+        if _rough_noise_ratios is not UNSET:
+            rough_noise_ratios = []
+            for rough_noise_ratios_item_data in _rough_noise_ratios:
+                rough_noise_ratios_item = NoiseRatio.from_dict(rough_noise_ratios_item_data)
+
+                rough_noise_ratios.append(rough_noise_ratios_item)
+
         _quartic_noise_ratios = d.pop("quartic_noise_ratios", UNSET)
         quartic_noise_ratios: list[NoiseRatio] | Unset = UNSET
         if _quartic_noise_ratios is not UNSET:
@@ -175,6 +197,7 @@ class Hyperparameters:
             length_scale=length_scale,
             variance=variance,
             radius=radius,
+            rough_noise_ratios=rough_noise_ratios,
             quartic_noise_ratios=quartic_noise_ratios,
             means=means,
             bend_noise_deviation=bend_noise_deviation,

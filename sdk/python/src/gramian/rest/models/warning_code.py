@@ -18,6 +18,7 @@ class WarningCode(StrEnum):
     RAW_MESH = "raw_mesh"
     REFINED = "refined"
     REPEATED_ROWS = "repeated_rows"
+    SHARP_EDGES = "sharp_edges"
     UNITS_DIFFER = "units_differ"
     VARIANCE_CLAMPED = "variance_clamped"
 
