@@ -27,7 +27,7 @@ const STIFF: f64 = 4.0;
 /// derivatives. Length scale ℓ in units of the radius of a neighbourhood.
 ///
 /// With ν = 9/2 alone, what is within half a spacing of a jump is off by eight deviations. With a length
-/// scale of 1.4 this process is too smooth as well, and with 6 it says the same (docs/error-bars.md).
+/// scale of 1.4 this process is too smooth as well, and with 6 its bars are as long (docs/error-bars.md).
 const ROUGH_ORDER: u8 = 2;
 const ROUGH_LENGTH_SCALE: f64 = 3.0;
 

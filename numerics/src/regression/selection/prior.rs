@@ -2,7 +2,7 @@
 
 use crate::points::cloud::Cloud;
 
-/// What is thought of the length scales of axes before there are values. It counts where a search varies the
+/// Prior distribution of the length scales of axes. It counts where a search varies the
 /// length scales of single axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub enum ScalePrior {

@@ -1,10 +1,10 @@
 //! Sharp edges and steps: places where two sheets of a surface meet at an angle, or end beside each other at
 //! two heights.
 //!
-//! Each neighbour of a query says of its own sheet how high the query is above it, and which normal the sheet
-//! has there: it extrapolates its quadric. Where a surface is smooth, all neighbours say the same. Around an
-//! edge they form two groups, and no deviation of a regression over one group, or over both, says so. A query
-//! is at an edge unless it lies on one sheet alone and its own normal is that of this sheet.
+//! The quadric of each neighbour is extrapolated to the query: to the height of the query above it, and to
+//! its normal there. On a smooth surface all extrapolations agree. Around an edge they form two groups, which
+//! the deviation of a regression over one group, or over both, does not show. A query is at an edge unless it
+//! lies on one sheet alone and its own normal is that of this sheet.
 
 use rayon::prelude::*;
 use smallvec::SmallVec;
@@ -18,11 +18,11 @@ use crate::points::cloud::Cloud;
 use crate::points::neighbours::Neighbour;
 use crate::surface::served::Edge;
 
-/// Neighbours that are asked in dimensions 2, 3 and 4: those within two to three spacings.
+/// Number of neighbours in dimensions 2, 3 and 4: those within two to three spacings.
 const N_ASKED: [usize; 3] = [6, 20, 33];
 
-/// Greatest angle, radians, by which the quadric of a neighbour turns from it to the query. Beyond, a quadric
-/// does not say what its sheet is, and every circle of ten points would have edges.
+/// Greatest angle, radians, by which the quadric of a neighbour turns from it to the query. Beyond, quadrics
+/// extrapolate too badly, and every circle of ten points would have edges.
 const MOST_TURN: f64 = 0.6;
 
 /// Least and greatest angle between the sheets of an edge, radians. Less is a bend. With more, the two faces
@@ -34,7 +34,7 @@ const GREATEST_ANGLE: f64 = 2.97;
 const LEAST_STEP: f64 = 0.5;
 
 /// Standard deviations by which the normals of two sheets differ, or their heights. With noise of a spacing,
-/// a hundredth of the points of smooth bodies are then taken for edges. Without this bound, a quarter is.
+/// half a per cent of the points of a torus are then taken for edges. Without this bound, a fifth is.
 const APART: f64 = 1.5;
 
 /// Angle within which normals belong to one sheet, radians, and difference of heights, in spacings. As much
@@ -73,7 +73,7 @@ pub(super) struct Points<'a> {
 
 type Vector = SmallVec<[f64; MAX_LOCAL_DIMENSION]>;
 
-/// What a neighbour says of its sheet at a query.
+/// The sheet of a neighbour, extrapolated to a query.
 struct Said {
     normal: Vector,
     /// Height of the query above the sheet, spacings.
@@ -83,7 +83,7 @@ struct Said {
     height_deviation: f64,
 }
 
-/// What all neighbours on a sheet say of it.
+/// A sheet by all neighbours that agree on it.
 struct Sheet {
     said: Said,
     /// How far they differ: what a quadric extrapolates badly.
@@ -233,8 +233,7 @@ impl Sheet {
     }
 }
 
-/// What the regression at a query itself says: its height is that of the query above its own sheet, with the
-/// noise of the query.
+/// The sheet of a query by its own regression, at height 0 with the noise of the query.
 struct OwnSaid {
     said: Said,
 }
