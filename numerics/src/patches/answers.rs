@@ -53,9 +53,8 @@ pub struct CurvatureDeviations {
     /// True where the surface turns by a radian or more within the radius of the neighbourhood, `[m]`. A
     /// quadric cannot follow such a turn, and the deviations miss it.
     pub is_bent: Vec<bool>,
-    /// True where the surface surely turns by less than a tenth of a radian within the radius of the
-    /// neighbourhood, `[m]`.
-    pub is_flat: Vec<bool>,
+    /// Radius of the neighbourhood, L, of the finest level that knows the surface there, `[m]`.
+    pub radii: Vec<f64>,
 }
 
 /// Least bend of a bent surface: its largest curvature in units of the radius of the neighbourhood.
@@ -63,10 +62,6 @@ pub struct CurvatureDeviations {
 /// Half of the curvatures that are off by half in spite of small deviations lie beyond it. Only 2 % of the
 /// right ones do (docs/error-bars.md).
 const BENT: f64 = 1.0;
-
-/// Greatest bend of a flat surface, with [`SURELY`] deviations of the curvature that is known least.
-const FLAT_BEND: f64 = 0.1;
-const SURELY: f64 = 2.0;
 
 /// Deviation of a normal, in radians, below which its neighbourhood is flat. The stiffer process then gives
 /// the slopes.
@@ -79,7 +74,7 @@ impl PatchGeometry {
             mean: vec![0.0; m],
             gaussian: vec![0.0; m],
             is_bent: vec![false; m],
-            is_flat: vec![false; m],
+            radii: vec![0.0; m],
         });
         Self {
             is_known: vec![false; m],
@@ -99,10 +94,10 @@ impl PatchGeometry {
         let mut curvatures: Vec<Option<CurvatureSlots<'_>>> = Vec::new();
         if let Some(deviations) = &mut self.curvatures {
             let rest = deviations.mean.chunks_mut(lanes).zip(deviations.gaussian.chunks_mut(lanes));
-            let bends = deviations.is_bent.chunks_mut(lanes).zip(deviations.is_flat.chunks_mut(lanes));
+            let bends = deviations.is_bent.chunks_mut(lanes).zip(deviations.radii.chunks_mut(lanes));
             let all = deviations.principal.chunks_mut(lanes * (d - 1)).zip(rest.zip(bends));
-            let slots = |(principal, ((mean, gaussian), (is_bent, is_flat)))| {
-                Some(CurvatureSlots { principal, mean, gaussian, is_bent, is_flat })
+            let slots = |(principal, ((mean, gaussian), (is_bent, radii)))| {
+                Some(CurvatureSlots { principal, mean, gaussian, is_bent, radii })
             };
             curvatures.extend(all.map(slots));
         }
@@ -146,7 +141,7 @@ struct CurvatureSlots<'a> {
     mean: &'a mut [f64],
     gaussian: &'a mut [f64],
     is_bent: &'a mut [bool],
-    is_flat: &'a mut [bool],
+    radii: &'a mut [f64],
 }
 
 impl Slots<'_> {
@@ -168,8 +163,7 @@ impl Slots<'_> {
             curvatures.mean[lane] = found.mean / place.radius;
             curvatures.gaussian[lane] = found.gaussian / place.radius.powi(k as i32);
             curvatures.is_bent[lane] = found.bend >= BENT;
-            let least_known = found.principal.iter().fold(0.0, |a: f64, &deviation| a.max(deviation));
-            curvatures.is_flat[lane] = found.bend + SURELY * least_known <= FLAT_BEND;
+            curvatures.radii[lane] = place.radius;
         }
     }
 }

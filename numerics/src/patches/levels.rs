@@ -39,7 +39,7 @@ pub struct Agreement {
 
 /// Difference of a fine and a coarse level in one quantity at one place.
 #[derive(Clone, Copy)]
-struct Said {
+struct Discrepancy {
     /// |a − c|², over the variance of one of its components without a bias.
     excess: f64,
     n_components: f64,
@@ -62,8 +62,8 @@ impl Agreement {
     pub(super) fn of(fine: &PatchGeometry, coarse: &PatchGeometry, dimension: usize) -> Self {
         let known = (0..fine.is_known.len()).filter(|&at| fine.is_known[at] && coarse.is_known[at]);
         let known: Vec<Difference> = known.map(|at| Difference::at(fine, coarse, at, dimension)).collect();
-        let shares = |said: &dyn Fn(&Difference) -> Said| {
-            let logs: Vec<Vec<f64>> = known.iter().map(|of| said(of).log_likelihoods()).collect();
+        let shares = |quantity: &dyn Fn(&Difference) -> Discrepancy| {
+            let logs: Vec<Vec<f64>> = known.iter().map(|of| quantity(of).log_likelihoods()).collect();
             common(mixture_shares(EXCESSES.len(), &logs))
         };
         Self { normals: shares(&|of| of.normal), curvatures: shares(&|of| of.curvature) }
@@ -86,7 +86,7 @@ pub(super) fn median_excess(fine: &PatchGeometry, refined: &PatchGeometry, dimen
     median(excesses.collect()).unwrap_or(0.0)
 }
 
-impl Said {
+impl Discrepancy {
     fn of(square: f64, variances: [f64; 2], n_components: f64) -> Self {
         let [fine, coarse] = variances;
         let variance = (fine - coarse).max(LEAST_VARIANCE * fine);
@@ -115,8 +115,8 @@ impl Said {
 struct Difference {
     /// −1 where the two normals have opposite signs.
     sign: f64,
-    normal: Said,
-    curvature: Said,
+    normal: Discrepancy,
+    curvature: Discrepancy,
 }
 
 impl Difference {
@@ -130,8 +130,8 @@ impl Difference {
         let of_means = [fine, coarse].map(|of| deviations(of).map_or(0.0, |own| own.mean[at].powi(2)));
         Self {
             sign,
-            normal: Said::of(square, variances, k as f64),
-            curvature: Said::of((mean_a - sign * mean_c).powi(2), of_means, 1.0),
+            normal: Discrepancy::of(square, variances, k as f64),
+            curvature: Discrepancy::of((mean_a - sign * mean_c).powi(2), of_means, 1.0),
         }
     }
 }
@@ -205,9 +205,11 @@ impl PatchGeometry {
         }
         mix(&mut own.mean[at], coarse.mean[at], square, weight);
         mix(&mut own.gaussian[at], coarse.gaussian[at], 0.0, weight);
+        if own.radii[at] == 0.0 {
+            own.radii[at] = coarse.radii[at];
+        }
         if weight.mean < 0.5 {
             own.is_bent[at] = coarse.is_bent[at];
-            own.is_flat[at] = coarse.is_flat[at];
         }
     }
 }

@@ -74,7 +74,7 @@ pub(super) struct Points<'a> {
 type Vector = SmallVec<[f64; MAX_LOCAL_DIMENSION]>;
 
 /// The sheet of a neighbour, extrapolated to a query.
-struct Said {
+struct Extrapolation {
     normal: Vector,
     /// Height of the query above the sheet, spacings.
     height: f64,
@@ -85,7 +85,7 @@ struct Said {
 
 /// A sheet by all neighbours that agree on it.
 struct Sheet {
-    said: Said,
+    mean: Extrapolation,
     /// How far they differ: what a quadric extrapolates badly.
     normal_spread: f64,
     height_spread: f64,
@@ -122,29 +122,29 @@ impl Points<'_> {
         self.on.sampling.neighbours().nearest_into(x, n_asked, found);
         let spacing = self.on.sampling.spacing(found.first()?.point);
         let known = found.iter().filter(|neighbour| self.geometry.is_known[neighbour.point]);
-        let said: SmallVec<[Said; 32]> =
-            known.filter_map(|neighbour| self.said(x, neighbour, spacing)).collect();
-        if said.iter().all(|other| said[0].is_as(other)) {
+        let sheets: SmallVec<[Extrapolation; 32]> =
+            known.filter_map(|neighbour| self.extrapolation(x, neighbour, spacing)).collect();
+        if sheets.iter().all(|other| sheets[0].is_as(other)) {
             return None;
         }
-        let own = OwnSaid {
-            said: Said {
-                normal: queries.geometry.normals[query * d..][..d].into(),
-                height: 0.0,
-                normal_deviation: queries.geometry.normal_deviations[query],
-                height_deviation: (queries.noise)(query) / spacing,
-            },
+        // The sheet by the regression of the query itself, at height 0 with the noise of the query.
+        let own = Extrapolation {
+            normal: queries.geometry.normals[query * d..][..d].into(),
+            height: 0.0,
+            normal_deviation: queries.geometry.normal_deviations[query],
+            height_deviation: (queries.noise)(query) / spacing,
         };
-        let first = Sheet::of(&said, d, |other| own.said.agrees(other));
-        let first = first.or_else(|| Sheet::of(&said, d, |_| true))?;
-        let second = Sheet::of(&said, d, |other| first.said.is_apart_from(other, 0.0))?;
-        let are_two = first.said.is_apart_from(&second.said, APART) && first.is_near() && second.is_near();
+        let first = Sheet::of(&sheets, d, |other| own.agrees(other));
+        let first = first.or_else(|| Sheet::of(&sheets, d, |_| true))?;
+        let second = Sheet::of(&sheets, d, |other| first.mean.is_apart_from(other, 0.0))?;
+        let are_two = first.mean.is_apart_from(&second.mean, APART) && first.is_near() && second.is_near();
         let is_clear = own.is_of(&first) && !own.is_on(&second);
-        (are_two && !is_clear).then(|| [first.said.normal, second.said.normal].concat())
+        (are_two && !is_clear).then(|| [first.mean.normal, second.mean.normal].concat())
     }
 
-    /// Returns what a neighbour says at x, where points have this spacing, if it says anything so far away.
-    fn said(&self, x: &[f64], neighbour: &Neighbour, spacing: f64) -> Option<Said> {
+    /// Extrapolates the sheet of a neighbour to x, where points have this spacing. `None` where it would turn
+    /// too far on the way.
+    fn extrapolation(&self, x: &[f64], neighbour: &Neighbour, spacing: f64) -> Option<Extrapolation> {
         let (of, d, point) = (self.geometry, x.len(), neighbour.point);
         let (normal, shape) = (&of.normals[point * d..][..d], &of.shapes[point * d * d..][..d * d]);
         let arm: Vector = x.iter().zip(self.on.cloud.point(point)).map(|(x, y)| x - y).collect();
@@ -156,7 +156,7 @@ impl Points<'_> {
         let normal_deviation = of.normal_deviations[point];
         let height_deviation = of.height_deviations[point].hypot(normal_deviation * norm(&arm));
         let normal = unit(normal.iter().zip(&turn).map(|(n, t)| n + t).collect());
-        Some(Said {
+        Some(Extrapolation {
             normal,
             height: height / spacing,
             normal_deviation,
@@ -165,7 +165,7 @@ impl Points<'_> {
     }
 }
 
-impl Said {
+impl Extrapolation {
     /// Whether both describe one smooth sheet, whatever their deviations.
     fn is_as(&self, other: &Self) -> bool {
         angle(&self.normal, &other.normal) <= SAME_SHEET && (self.height - other.height).abs() <= SAME_HEIGHT
@@ -198,10 +198,14 @@ impl Said {
 impl Sheet {
     /// Returns the sheet on which most neighbours agree with one that is a `candidate`, if there are as many
     /// as dimensions.
-    fn of(said: &[Said], dimension: usize, is_candidate: impl Fn(&Said) -> bool) -> Option<Self> {
-        let n_agreed = |of: &&Said| said.iter().filter(|other| of.agrees(other)).count();
-        let best = said.iter().filter(|of| is_candidate(of)).max_by_key(n_agreed)?;
-        let members: SmallVec<[&Said; 32]> = said.iter().filter(|other| best.agrees(other)).collect();
+    fn of(
+        all: &[Extrapolation],
+        dimension: usize,
+        is_candidate: impl Fn(&Extrapolation) -> bool,
+    ) -> Option<Self> {
+        let n_agreed = |of: &&Extrapolation| all.iter().filter(|other| of.agrees(other)).count();
+        let best = all.iter().filter(|of| is_candidate(of)).max_by_key(n_agreed)?;
+        let members: SmallVec<[&Extrapolation; 32]> = all.iter().filter(|other| best.agrees(other)).collect();
         if members.len() < dimension {
             return None;
         }
@@ -214,7 +218,7 @@ impl Sheet {
         Some(Self {
             normal_spread: OF_MEDIAN * median(&members, |member| angle(&member.normal, &normal)),
             height_spread: OF_MEDIAN * median(&members, |member| (member.height - height).abs()),
-            said: Said {
+            mean: Extrapolation {
                 height,
                 normal_deviation: median(&members, |member| member.normal_deviation),
                 height_deviation: median(&members, |member| member.height_deviation),
@@ -224,35 +228,30 @@ impl Sheet {
     }
 
     fn height_deviation(&self) -> f64 {
-        self.said.height_deviation.hypot(self.height_spread)
+        self.mean.height_deviation.hypot(self.height_spread)
     }
 
     fn is_near(&self) -> bool {
         let deviation = self.height_deviation();
-        deviation <= KNOWN && self.said.height.abs() <= NEAR + DEVIATIONS * deviation
+        deviation <= KNOWN && self.mean.height.abs() <= NEAR + DEVIATIONS * deviation
     }
 }
 
-/// The sheet of a query by its own regression, at height 0 with the noise of the query.
-struct OwnSaid {
-    said: Said,
-}
-
-impl OwnSaid {
+impl Extrapolation {
     fn is_on(&self, sheet: &Sheet) -> bool {
-        let deviation = sheet.height_deviation().hypot(self.said.height_deviation);
-        sheet.said.height.abs() <= DEVIATIONS * deviation + ROUNDING
+        let deviation = sheet.height_deviation().hypot(self.height_deviation);
+        sheet.mean.height.abs() <= DEVIATIONS * deviation + ROUNDING
     }
 
     /// Whether the query is on the sheet and has its normal.
     fn is_of(&self, sheet: &Sheet) -> bool {
-        let [deviation, _] = self.said.doubts(&sheet.said);
-        let between = angle(&self.said.normal, &sheet.said.normal);
+        let [deviation, _] = self.doubts(&sheet.mean);
+        let between = angle(&self.normal, &sheet.mean.normal);
         self.is_on(sheet) && between <= DEVIATIONS * deviation.hypot(sheet.normal_spread) + SAME_SHEET
     }
 }
 
-fn median(members: &[&Said], of: impl Fn(&Said) -> f64) -> f64 {
+fn median(members: &[&Extrapolation], of: impl Fn(&Extrapolation) -> f64) -> f64 {
     let mut all: SmallVec<[f64; 32]> = members.iter().map(|member| of(member)).collect();
     all.sort_unstable_by(f64::total_cmp);
     all[all.len() / 2]

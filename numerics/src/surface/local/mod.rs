@@ -1,5 +1,6 @@
 //! The surface made of local regressions, with one side chosen for all of it.
 
+mod bend;
 pub mod coarse;
 mod edges;
 mod rows;
@@ -13,7 +14,6 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::curvature::{FLAT, principal_curvatures};
 use crate::error::NumericsError;
 use crate::machine::heap::{arc_payload, block_bytes, vec_bytes};
 use crate::machine::vector::{dot, norm};
@@ -24,6 +24,7 @@ use crate::patches::{PatchGeometry, PatchHyperparameters, Patches};
 use crate::points::cloud::Cloud;
 use crate::points::neighbourhoods::Neighbourhoods;
 use crate::points::sampling::Sampling;
+use bend::Bend;
 use coarse::outward_directions;
 use smoothed::{Placed, Smoothed};
 use sure::least_ratio;
@@ -143,10 +144,11 @@ impl LocalSurface {
                 let radius = if cloud.radius() > 0.0 { cloud.radius() } else { 1.0 };
                 // Where the surface is flat, there is no curvature to be known to a part of its size. Unknown
                 // and bent points are not sure either.
-                let is_curved = |point: &usize| !is_flat(&at_points, *point);
-                let ratio = |point| ratio(&at_points, point, d, radius).unwrap_or(0.0);
-                let curved = (0..cloud.n_points()).into_par_iter().filter(is_curved);
-                let ratios: Vec<f64> = curved.map(ratio).collect();
+                let ratio = |point| match Bend::of(&at_points, point, d) {
+                    Some(bend) if bend.is_flat() => None,
+                    bend => Some(bend.and_then(|bend| bend.ratio(radius)).unwrap_or(0.0)),
+                };
+                let ratios: Vec<f64> = (0..cloud.n_points()).into_par_iter().filter_map(ratio).collect();
                 (radius, least_ratio(&ratios))
             }
         };
@@ -183,6 +185,17 @@ impl LocalSurface {
     /// Geometry at the ordered points, with outward normals.
     pub(crate) fn at_points(&self) -> &PatchGeometry {
         &self.at_points
+    }
+
+    /// Returns the outward normals of the points in the order in which they were given.
+    pub(crate) fn oriented(&self) -> Oriented {
+        let d = self.cloud.dimension();
+        Oriented {
+            normals: self.ordered.given_rows(&self.at_points.normals, d),
+            how: self.orientation,
+            is_consistent: true,
+            is_ambiguous: self.ordered.given_rows(&self.is_ambiguous, 1),
+        }
     }
 
     pub fn patches(&self) -> &Patches {
@@ -253,25 +266,6 @@ impl LocalSurface {
             + vec_bytes(&self.is_ambiguous)
             + block_bytes(arc_payload::<Self>())
     }
-}
-
-/// Returns whether the surface is surely flat in the neighbourhood.
-fn is_flat(geometry: &PatchGeometry, query: usize) -> bool {
-    geometry.curvatures.as_ref().is_some_and(|found| found.is_flat[query])
-}
-
-/// Returns the largest principal curvature over the largest deviation of one, infinite for deviations of 0.
-///
-/// `None` where nothing is known, or where the surface bends more than deviations can say.
-fn ratio(geometry: &PatchGeometry, query: usize, d: usize, radius: f64) -> Option<f64> {
-    let deviations = geometry.curvatures.as_ref().filter(|found| !found.is_bent[query])?;
-    let (normal, shape) = (&geometry.normals[query * d..][..d], &geometry.shapes[query * d * d..][..d * d]);
-    let (curvatures, _) = principal_curvatures(normal, shape, 1.0);
-    let largest = curvatures.iter().fold(FLAT / radius, |a: f64, k| a.max(k.abs()));
-    let deviations = &deviations.principal[query * (d - 1)..][..d - 1];
-    let deviation = deviations.iter().fold(0.0, |a: f64, &deviation| a.max(deviation));
-    let ratio = if deviation > 0.0 { largest / deviation } else { f64::INFINITY };
-    (geometry.is_known[query] && !ratio.is_nan()).then_some(ratio)
 }
 
 /// What says the sides of points.

@@ -44,7 +44,7 @@ impl PatchGeometry {
             mean: ordered.given_rows(&own.mean, 1),
             gaussian: ordered.given_rows(&own.gaussian, 1),
             is_bent: ordered.given_rows(&own.is_bent, 1),
-            is_flat: ordered.given_rows(&own.is_flat, 1),
+            radii: ordered.given_rows(&own.radii, 1),
         });
         Self {
             is_known: ordered.given_rows(&self.is_known, 1),
@@ -67,7 +67,7 @@ impl PatchGeometry {
                 + vec_bytes(&c.mean)
                 + vec_bytes(&c.gaussian)
                 + vec_bytes(&c.is_bent)
-                + vec_bytes(&c.is_flat)
+                + vec_bytes(&c.radii)
         };
         vectors.into_iter().chain(numbers).map(vec_bytes).sum::<usize>()
             + vec_bytes(&self.is_known)

@@ -2,8 +2,9 @@
 
 use rayon::prelude::*;
 
+use super::bend::Bend;
 use super::edges::{Points, Queries};
-use super::{LocalSurface, Placed, is_flat, ratio};
+use super::{LocalSurface, Placed};
 use crate::error::NumericsError;
 use crate::observer::{Observer, Stage};
 use crate::patches::{CurvatureDeviations, PatchGeometry};
@@ -112,8 +113,9 @@ impl LocalSurface {
     /// Returns whether the curvatures are known well enough to be used: to a part of their size, or to be
     /// those of a plane as far as the neighbourhood reaches.
     fn is_resolved(&self, geometry: &PatchGeometry, query: usize) -> bool {
-        let ratio = ratio(geometry, query, self.cloud.dimension(), self.radius);
-        is_flat(geometry, query) || ratio.is_some_and(|ratio| ratio >= self.least_ratio)
+        Bend::of(geometry, query, self.cloud.dimension()).is_some_and(|bend| {
+            bend.is_flat() || bend.ratio(self.radius).is_some_and(|ratio| ratio >= self.least_ratio)
+        })
     }
 
     /// Turns normals to the side of the normals of nearby points.
