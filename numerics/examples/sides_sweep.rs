@@ -8,7 +8,8 @@ mod common;
 mod sides;
 
 use sides::cases::{
-    Case, curves, folded_curve, folded_sheet, lens, nested_spheres, plate, tube, two_spheres,
+    Case, cone, curves, folded_curve, folded_sheet, lens, nested_spheres, noisy_curves, plate, pyramid, tube,
+    two_spheres,
 };
 use sides::tally::SideTally;
 
@@ -26,6 +27,12 @@ fn main() {
     let over_sizes = |case: &dyn Fn(usize) -> Case| sizes.iter().map(|&n| case(n)).collect::<Vec<_>>();
     println!("{HEADER}");
     print_rows("curves", &sizes.iter().flat_map(|&n| curves(n, 1)).collect::<Vec<_>>());
+    for noise in [0.1, 0.3, 0.5] {
+        let noisy: Vec<Case> = sizes.iter().flat_map(|&n| noisy_curves(n, noise, 1)).collect();
+        print_rows(&format!("curves, noise {noise}"), &noisy);
+    }
+    print_rows("cone", &over_sizes(&|n| cone(n, 1)));
+    print_rows("pyramid", &over_sizes(&|n| pyramid(n, 1)));
     print_rows("folded strip, 4", &over_sizes(&|n| folded_curve(n, 4.0, 1)));
     for thickness in [0.5, 0.75, 1.0, 1.26, 1.84, 2.0, 3.0, 4.0] {
         print_rows(&format!("plate, {thickness}"), &over_sizes(&|n| plate(n, thickness, 1)));

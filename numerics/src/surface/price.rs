@@ -68,7 +68,9 @@ pub(crate) fn signature_surface_price(n_points: usize, dimension: usize) -> Pric
     let flops = n * at_points + 2.0 * sampling_flops(n_points, dimension);
     // In three dimensions, 4.5 kB were measured when quadrics were small vectors (tests/it/memory.rs). Now it
     // is a bound.
-    Price { n_bytes: n_points.saturating_mul(1500 + 400 * dimension * dimension), flops }
+    let own = Price { n_bytes: n_points.saturating_mul(1500 + 400 * dimension * dimension), flops };
+    // Local regressions say whether a plane curve is noisy.
+    if dimension == 2 { own.and(local_surface_price(n_points, dimension)) } else { own }
 }
 
 /// The price of a surface by local regressions, whose side is chosen by a coarse signature function.
@@ -76,7 +78,7 @@ pub(crate) fn local_surface_price(n_points: usize, dimension: usize) -> Price {
     let (n, coarse) = (n_points as f64, n_coarse(n_points));
     let of_coarse = FactorPrice::of(coarse, dimension).expected;
     // The ordered points, with their tree and spacings, are 22 + 16 d.
-    let per_point = 722 + 16 * dimension * (dimension + 1);
+    let per_point = 729 + 16 * dimension * (dimension + 1);
     Price {
         n_bytes: n_points.saturating_mul(per_point).saturating_add(of_coarse.n_bytes),
         flops: choosing_flops(n_points, dimension)

@@ -6,7 +6,9 @@ use crate::patches::PatchGeometry;
 use crate::points::cloud::Cloud;
 use crate::points::sampling::Sampling;
 
-/// Noise across the surface, in spacings, from which points are moved.
+/// Noise across the surface, in spacings, from which points are moved. Of curves it is in nearest distances:
+/// the points that a spacing is the mean of lie two steps away on either side, and it is single steps that
+/// noise turns.
 ///
 /// Steps between points that noise has moved apart look like steps to another sheet, and areas between them
 /// come out too large, by 2.4 with noise of half a spacing. A third of the normals of random tori then
@@ -46,7 +48,9 @@ impl Smoothed {
         observer: &dyn Observer,
     ) -> Result<Option<Self>, NumericsError> {
         let Placed { cloud, sampling } = points;
-        if noise < NOISY * sampling.scales().spacing || !are_like_noise(&geometry.heights) {
+        let scales = sampling.scales();
+        let step = if cloud.dimension() == 2 { scales.nearest } else { scales.spacing };
+        if noise < NOISY * step || !are_like_noise(&geometry.heights) {
             return Ok(None);
         }
         let cloud = Cloud::new(geometry.feet(cloud, 0..cloud.n_points()), cloud.dimension())?;

@@ -5,6 +5,7 @@ mod deviations;
 mod directions;
 mod doubt;
 mod function;
+mod noisy;
 mod offset;
 mod serving;
 
@@ -30,6 +31,7 @@ use crate::regression::function::interpolant::Interpolant;
 use crate::regression::solver::MAX_INVERSE_DIAGONAL;
 use directions::directions;
 pub use function::Signature;
+use noisy::oriented_curve;
 pub(crate) use serving::serve;
 
 /// A surface with local quadrics and consistently oriented normals at the points, d ≥ 2.
@@ -78,9 +80,18 @@ impl SignatureSurface {
         let around = Neighbourhoods::of(sampling.neighbours(), cloud, count, observer)?;
         let quadrics = LocalQuadrics::of(cloud, &around, cloud, observer)?;
         let around = around.narrowed(n_around(cloud));
-        let directions = directions(&signature, &sampling, &quadrics, observer)?;
-        let sampled = Sampled { cloud, sampling: &sampling, around: &around, observer };
-        let oriented = Oriented::of(&sampled, directions, &quadrics, given)?;
+        let told_by_regressions = match given {
+            None => oriented_curve(cloud, &sampling, observer)?,
+            Some(_) => None,
+        };
+        let oriented = match told_by_regressions {
+            Some(oriented) => oriented,
+            None => {
+                let directions = directions(&signature, &sampling, &quadrics, observer)?;
+                let sampled = Sampled { cloud, sampling: &sampling, around: &around, observer };
+                Oriented::of(&sampled, directions, &quadrics, given)?
+            }
+        };
         let is_too_rough = is_too_rough(solver.kernel(), sampling.scales());
         let radius = if cloud.radius() > 0.0 { cloud.radius() } else { 1.0 };
         let left_out_misses = OnceLock::new();

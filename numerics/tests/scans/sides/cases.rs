@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use super::clouds::{
-    Sided, along, cassini, faceted, folded_strip, half_cone, half_lens, half_plate, length_of, polar,
-    revolved, revolved_area, ring, sphere, surface_spacing,
+    Sided, along, cassini, faceted, folded_strip, half_cone, half_lens, half_plate, length_around, length_of,
+    polar, revolved, revolved_area, ring, sphere, surface_spacing,
 };
 use crate::common::random::Random;
 
@@ -37,6 +37,16 @@ pub fn curves(n: usize, seed: u64) -> Vec<Case> {
         }
     }
     cases
+}
+
+/// The curves of [`curves`] with noise of so many mean distances along them in every direction.
+pub fn noisy_curves(n: usize, noise: f64, seed: u64) -> Vec<Case> {
+    let mut random = Random(1000 + seed);
+    let moved = |Case { name, sided, thickness }| {
+        let sigma = noise * length_around(&sided.cloud) / n as f64;
+        Case::new(format!("{name}, noise {noise}"), sided.noisy(sigma, &mut random), thickness)
+    };
+    curves(n, seed).into_iter().map(moved).collect()
 }
 
 /// A plane strip folded five times. Its thickness and gaps are `thickness` spacings.
@@ -72,6 +82,24 @@ pub fn pyramid(n: usize, seed: u64) -> Case {
         (0..4).map(|side| [corners[side], corners[(side + 1) % 4], [0.0, 0.0, 1.5]]).collect();
     triangles.extend([[corners[0], corners[2], corners[1]], [corners[0], corners[3], corners[2]]]);
     Case::new(format!("pyramid, {n}"), faceted(&triangles, n, &mut Random(seed)), f64::INFINITY)
+}
+
+/// The faces of a box of half extents 1, 0.7 and 0.5, two triangles each, its lid first.
+pub fn box_faces() -> Vec<[[f64; 3]; 3]> {
+    let half = [1.0, 0.7, 0.5];
+    let faces = [(2, 1.0), (2, -1.0), (0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)];
+    let triangles = faces.map(|(axis, side)| {
+        let corner = |u: f64, v: f64| {
+            let mut x = [0.0; 3];
+            x[axis] = side * half[axis];
+            x[(axis + 1) % 3] = u * half[(axis + 1) % 3];
+            x[(axis + 2) % 3] = side * v * half[(axis + 2) % 3];
+            x
+        };
+        let [a, b, c, e] = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+        [[a, b, c], [a, c, e]]
+    });
+    triangles.concat()
 }
 
 /// A round plate with a round rim, `thickness` spacings thick.

@@ -28,6 +28,13 @@ impl Sided {
         Self { cloud: Cloud::new(points, parts[0].cloud.dimension()).unwrap(), normals }
     }
 
+    /// Moves the points by normal noise of a deviation `sigma` in every direction, and keeps their normals.
+    pub fn noisy(mut self, sigma: f64, random: &mut Random) -> Self {
+        let moved = self.cloud.coordinates().iter().map(|x| x + sigma * random.normal()).collect();
+        self.cloud = Cloud::new(moved, self.cloud.dimension()).unwrap();
+        self
+    }
+
     /// Reverses the normals, as for a cavity.
     pub fn inside_out(mut self) -> Self {
         self.normals.iter_mut().for_each(|c| *c = -*c);
@@ -196,6 +203,14 @@ pub fn revolved_area(outline: &[Place]) -> f64 {
 /// The length of an outline.
 pub fn length_of(outline: &[Place]) -> f64 {
     Lot::of(outline, |_| 1.0).total()
+}
+
+/// The length of the polygon through the points of a plane curve around the origin, by their angles.
+pub fn length_around(curve: &Cloud) -> f64 {
+    let mut points: Vec<&[f64]> = curve.points().collect();
+    points.sort_by(|a, b| a[1].atan2(a[0]).total_cmp(&b[1].atan2(b[0])));
+    let next = points.iter().cycle().skip(1);
+    points.iter().zip(next).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).sum()
 }
 
 /// n random points of a sphere.
