@@ -7,6 +7,7 @@ use super::pieces::{Bounds, Piece, is_large};
 use super::winding::field::Field;
 use super::{Directions, Sampled, gaps, n_neighbours, sides};
 use crate::error::NumericsError;
+use crate::machine::vector::dot;
 use crate::observer::for_each;
 
 /// Cosine of neighbouring normals above which they belong to one region.
@@ -75,6 +76,9 @@ pub(super) fn consistent_signs(
         has_rim.iter_mut().zip(&sides.is_closed).for_each(|(has_rim, is_closed)| *has_rim &= !is_closed);
         is_ambiguous = sides.is_ambiguous;
     }
+    let is_end = (0..n).map(|point| is_at_rim[point] && scene.goes_on_smoothly(point)).collect::<Vec<_>>();
+    let pieces = pieces.members.iter().map(|points| scene.piece(points));
+    has_rim.iter_mut().zip(pieces).for_each(|(has_rim, piece)| *has_rim &= piece.has_rim(&is_end));
     let n_flipped = (0..n).filter(|&point| directions.has_sign[point] && signs[point] < 0.0).count();
     Ok(Signs { signs, n_flipped, is_open: has_rim.contains(&true), is_resolved, is_ambiguous })
 }
@@ -101,6 +105,20 @@ struct Scene<'a> {
 }
 
 impl Scene<'_> {
+    fn piece<'a>(&'a self, points: &'a [usize]) -> Piece<'a> {
+        let Self { sampled, directions, relative, .. } = self;
+        Piece { sampled, directions, points, relative }
+    }
+
+    /// Returns whether the normals around a point are like its own. At a sharp edge each sheet has a rim, and
+    /// the surface goes on with another normal.
+    fn goes_on_smoothly(&self, point: usize) -> bool {
+        let d = self.sampled.cloud.dimension();
+        let normal = |point: usize| &self.directions.normals[point * d..][..d];
+        let around = self.sampled.around.around(point).iter();
+        around.map(|&other| dot(normal(point), normal(other as usize))).all(|along| along.abs() > SAME_REGION)
+    }
+
     /// Chooses the signs of points, for each piece by itself. Also returns whether each piece has a rim.
     ///
     /// # Errors
@@ -112,8 +130,7 @@ impl Scene<'_> {
         let (mut signs, mut has_rims) =
             (self.relative.to_vec(), Vec::with_capacity(self.pieces.members.len()));
         for_each(self.pieces.members.iter().enumerate(), self.sampled.observer, |(at, points)| {
-            let (sampled, directions, relative) = (self.sampled, self.directions, self.relative);
-            let piece = Piece { sampled, directions, points, relative };
+            let (sampled, piece) = (self.sampled, self.piece(points));
             let has_rim = piece.has_rim(self.is_at_rim);
             let own = Bounds::of(sampled.cloud, points);
             let is_nested = boxes.iter().any(|(other, bounds)| *other != at && bounds.contain(&own));
