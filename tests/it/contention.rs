@@ -79,3 +79,36 @@ async fn a_new_cloud_registered_by_many_at_once_is_described_to_all() {
         );
     }
 }
+
+/// Points of a unit sphere with noise of about half a spacing.
+fn noisy_sphere(n: usize) -> Value {
+    let noise = |k: usize| (12.9898 * (k as f64 + 1.0)).sin() * 43_758.545_3 % 1.0 * 0.03;
+    let moved = |(at, x): (usize, [f64; 3])| [0, 1, 2].map(|c| x[c] + noise(3 * at + c));
+    json!(crate::support::fibonacci_sphere(n).into_iter().enumerate().map(moved).collect::<Vec<_>>())
+}
+
+/// A table of six columns in different units with values of three of them.
+fn table() -> Value {
+    let column = |row: usize, c: usize| (7.31 * (row + 1) as f64 * (c + 1) as f64).sin().abs();
+    let rows: Vec<Vec<f64>> =
+        (0..150).map(|row| (0..6).map(|c| 10f64.powi(c as i32) * column(row, c)).collect()).collect();
+    let values: Vec<f64> =
+        (0..150).map(|row| column(row, 0) + 2.0 * column(row, 1) * column(row, 2)).collect();
+    json!({"cloud": {"points": rows}, "values": values, "queries": [rows[3], rows[4]]})
+}
+
+/// Levels of means, edges, and length scales of columns are searched for on the pool by each of these.
+#[tokio::test(flavor = "multi_thread")]
+async fn noisy_surfaces_and_tables_asked_for_by_many_at_once_are_made_once() {
+    let surface = json!({"cloud": {"points": noisy_sphere(3000)}, "include": ["deviations", "edge_normals"]});
+    let requests = [("/v1/curvatures", surface), ("/v1/interpolation", table())];
+    for n_threads in ["2", "16"] {
+        let server = Server::with_flags(&["--threads", n_threads]).await;
+        for (path, body) in &requests {
+            let all = join_all((0..N_CLIENTS).map(|_| server.post(path, body)));
+            let answers = tokio::time::timeout(PATIENCE, all).await.expect("hangs");
+            assert_eq!(answers[0].status, 200, "{path}: {}", answers[0].text);
+            assert!(answers.iter().all(|answer| answer.text == answers[0].text), "{path}");
+        }
+    }
+}

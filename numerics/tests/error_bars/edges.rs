@@ -320,6 +320,35 @@ pub fn body_answered(body: Body, n: usize, noise: f64) -> Answered {
 }
 
 #[test]
+fn unit_rotation_and_place_do_not_matter_at_edges() {
+    let mut random = Random(11);
+    let part = Part::of(cuboid([1.0; 3]), 2_000, &mut random);
+    let noisy: Vec<Point> =
+        part.points.iter().map(|x| x.map(|c| c + 0.1 * part.spacing * random.normal())).collect();
+    // A turn about (1, 1, 1) by a third, and one about the third axis whose sine is 0.6.
+    let turned = |x: &Point| [0.8 * x[1] - 0.6 * x[2], 0.6 * x[1] + 0.8 * x[2], x[0]];
+    let moved = |x: &Point| {
+        let t = turned(x);
+        [1e-3 * t[0] + 5.0, 1e-3 * t[1] - 7.0, 1e-3 * t[2] + 2.0]
+    };
+    let asked = |points: &mut dyn Iterator<Item = Point>| {
+        normals(&Arc::new(Cloud::new(points.flatten().collect(), 3).unwrap()), Orientation::Outward)
+    };
+    let (own, of_moved) = (asked(&mut noisy.iter().copied()), asked(&mut noisy.iter().map(&moved)));
+    let n_edges = own.edges().len();
+    assert!(n_edges > 100, "{n_edges} points have two normals");
+    let (flags, moved_flags) = (reasons(&own), reasons(&of_moved));
+    let n_other = flags.iter().zip(&moved_flags).filter(|(a, b)| a != b).count();
+    assert!(n_other <= 4, "{n_other} flags differ");
+    let n_turned = (0..noisy.len()).filter(|&at| {
+        let normal: Point = own.normal(at).try_into().unwrap();
+        let found: Point = of_moved.normal(at).try_into().unwrap();
+        angle(&turned(&normal), &found) > 1e-4
+    });
+    assert!(n_turned.count() <= 4);
+}
+
+#[test]
 fn few_normals_at_edges_are_sure_and_wrong() {
     // Steps and ribs of a few points are off by more: docs/error-bars.md.
     for body in [Body::Cube, Body::Cylinder, Body::Cone] {
