@@ -149,6 +149,7 @@ def test_a_required_body_is_required_and_the_key_is_not() -> None:
         fit.Mean,
         fit.Quantity,
         fit.Deviations,
+        fit.GeometryWord,
         selection.Criterion,
         selection.Parameter,
     ],

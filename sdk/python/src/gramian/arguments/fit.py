@@ -24,6 +24,7 @@ from ..rest.models import (
     SolverChoice,
     SolverUsed,
     SurfaceChoice,
+    ValuesInclude,
 )
 from ..rest.types import Unset
 from .describe import described
@@ -47,7 +48,8 @@ Family: TypeAlias = KernelFamily | Literal["gauss", "laplace", "matern", "wendla
 Solver: TypeAlias = SolverChoice | SolverUsed | Literal["auto", "dense", "landmark", "iterative", "local"]
 Duplicates: TypeAlias = DuplicatePolicy | Literal["refuse", "merge"]
 Surface: TypeAlias = SurfaceChoice | Literal["auto", "signature", "offset", "local"]
-Deviations: TypeAlias = GeometryInclude | Literal["deviations", "edge_normals"]
+Deviations: TypeAlias = ValuesInclude | Literal["deviations"]
+GeometryWord: TypeAlias = GeometryInclude | Literal["deviations", "edge_normals"]
 MeshWord: TypeAlias = MeshInclude | Literal["curvatures", "deviations"]
 Quality: TypeAlias = MeshQuality | Literal["regular", "raw"]
 Mean: TypeAlias = MeanChoice | Literal["zero", "constant", "linear"]

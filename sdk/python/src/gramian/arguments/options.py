@@ -15,6 +15,7 @@ from .fit import (
     Deviations,
     Fit,
     GeometryLike,
+    GeometryWord,
     Mean,
     MeshWord,
     Number,
@@ -67,10 +68,9 @@ class DeviationOptions(TypedDict, total=False):
     Keys
     ----
     include : str or several, optional
-        Additional results: `"deviations"`, and of normals and curvatures `"edge_normals"`. Nothing if absent.
+        Additional results: `"deviations"`. Nothing if absent.
     deviations : bool, optional
-        True for standard deviations, as by `include="deviations"`. Those of normals and curvatures come from
-        local regressions, unless `kernel`, `alpha`, `surface` or `solver` say otherwise.
+        True for standard deviations, as by `include="deviations"`.
     """
 
     include: Deviations | Iterable[Deviations] | None
@@ -112,17 +112,24 @@ class PosteriorOptions(ValuesFit, total=False):
     threshold: Number | None
 
 
-class SurfaceOptions(DeviationOptions, SurfaceFit, total=False):
+class SurfaceOptions(SurfaceFit, total=False):
     """Options of normals and curvatures.
 
     Keys
     ----
+    include : str or several, optional
+        Additional results: `"deviations"`, `"edge_normals"`. Nothing if absent.
+    deviations : bool, optional
+        True for standard deviations, as by `include="deviations"`. They come from local regressions, unless
+        `kernel`, `alpha`, `surface` or `solver` say otherwise.
     surface : str, optional
         `"signature"`, `"offset"` or `"local"` to allow only that function. `"auto"` if absent.
     orientation : str, optional
         `"outward"` (if absent), or `"gradient"` for the side given by the gradient of u.
     """
 
+    include: GeometryWord | Iterable[GeometryWord] | None
+    deviations: bool | None
     surface: Surface | None
     orientation: Orientation | None
 
