@@ -87,6 +87,13 @@ fn noisy_sphere(n: usize) -> Value {
     json!(crate::support::fibonacci_sphere(n).into_iter().enumerate().map(moved).collect::<Vec<_>>())
 }
 
+/// A circle of n points with noise of about a third of their distance.
+fn noisy_circle(n: usize) -> Value {
+    let angle = |at: usize| std::f64::consts::TAU * at as f64 / n as f64;
+    let radius = |at: usize| 1.0 + (12.9898 * (at as f64 + 1.0)).sin() * 43_758.545_3 % 1.0 * 3.0 / n as f64;
+    json!((0..n).map(|at| [radius(at) * angle(at).cos(), radius(at) * angle(at).sin()]).collect::<Vec<_>>())
+}
+
 /// A table of six columns in different units with values of three of them.
 fn table() -> Value {
     let column = |row: usize, c: usize| (7.31 * (row + 1) as f64 * (c + 1) as f64).sin().abs();
@@ -97,11 +104,14 @@ fn table() -> Value {
     json!({"cloud": {"points": rows}, "values": values, "queries": [rows[3], rows[4]]})
 }
 
-/// Levels of means, edges, and length scales of columns are searched for on the pool by each of these.
+/// Levels of means, edges, sides of noisy curves and length scales of columns are found on the pool by each
+/// of these.
 #[tokio::test(flavor = "multi_thread")]
 async fn noisy_surfaces_and_tables_asked_for_by_many_at_once_are_made_once() {
     let surface = json!({"cloud": {"points": noisy_sphere(3000)}, "include": ["deviations", "edge_normals"]});
-    let requests = [("/v1/curvatures", surface), ("/v1/interpolation", table())];
+    let curve =
+        json!({"cloud": {"points": noisy_circle(1000)}, "include": ["deviations"], "solver": "dense"});
+    let requests = [("/v1/curvatures", surface), ("/v1/interpolation", table()), ("/v1/normals", curve)];
     for n_threads in ["2", "16"] {
         let server = Server::with_flags(&["--threads", n_threads]).await;
         for (path, body) in &requests {

@@ -87,7 +87,7 @@ pub struct UnfittedSurface {
     pub n_points: usize,
     pub dimension: usize,
     pub purpose: Purpose,
-    /// What is requested that only regressions have, if anything is.
+    /// The first requested quantity that only local regressions have, if there is one.
     pub only_regressed: Option<AutoReason>,
 }
 

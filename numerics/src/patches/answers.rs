@@ -53,7 +53,7 @@ pub struct CurvatureDeviations {
     /// True where the surface turns by a radian or more within the radius of the neighbourhood, `[m]`. A
     /// quadric cannot follow such a turn, and the deviations miss it.
     pub is_bent: Vec<bool>,
-    /// Radius of the neighbourhood, L, of the finest level that knows the surface there, `[m]`.
+    /// Radius of the neighbourhood, L, at the finest level with a regression there, `[m]`.
     pub radii: Vec<f64>,
 }
 

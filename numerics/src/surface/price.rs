@@ -69,7 +69,7 @@ pub(crate) fn signature_surface_price(n_points: usize, dimension: usize) -> Pric
     // In three dimensions, 4.5 kB were measured when quadrics were small vectors (tests/it/memory.rs). Now it
     // is a bound.
     let own = Price { n_bytes: n_points.saturating_mul(1500 + 400 * dimension * dimension), flops };
-    // Local regressions say whether a plane curve is noisy.
+    // The noise of a plane curve is estimated by local regressions, which orient it if it is noisy.
     if dimension == 2 { own.and(local_surface_price(n_points, dimension)) } else { own }
 }
 

@@ -280,7 +280,7 @@ impl Body {
     }
 }
 
-/// What a body with edges is answered, in per cent.
+/// Shares of flags and errors among the normals of a body with edges, in per cent.
 pub struct Answered {
     /// Points within a spacing of an edge with a flag.
     pub flagged: f64,

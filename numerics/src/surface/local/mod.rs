@@ -26,7 +26,7 @@ use crate::points::neighbourhoods::Neighbourhoods;
 use crate::points::sampling::Sampling;
 use bend::Bend;
 use coarse::outward_directions;
-use smoothed::{Placed, Smoothed};
+use smoothed::{Placed, Smoothed, is_noisy};
 use sure::least_ratio;
 use tree_order::TreeOrder;
 
@@ -96,6 +96,8 @@ pub struct LocalSurface {
     /// Geometry of the patches at the ordered points, normals outward.
     at_points: PatchGeometry,
     orientation: SurfaceOrientation,
+    /// True if normals of neighbours agree so well as lines that their signs can be compared.
+    is_consistent: bool,
     /// True where the evidence for the side of an ordered point is contradictory, `[n]`.
     is_ambiguous: Vec<bool>,
     radius: f64,
@@ -137,7 +139,7 @@ impl LocalSurface {
         let oriented = orient(on, &at_points, &sides, observer)?;
         let outward = |point: usize| &oriented.normals[point * d..][..d];
         at_points.turn(|point, normal| if dot(outward(point), normal) < 0.0 { -1.0 } else { 1.0 });
-        let (orientation, is_ambiguous) = (oriented.how, oriented.is_ambiguous);
+        let Oriented { how: orientation, is_consistent, is_ambiguous, .. } = oriented;
         let (radius, least_ratio) = match known {
             Some(known) => (known.radius, known.least_ratio),
             None => {
@@ -159,6 +161,7 @@ impl LocalSurface {
             patches,
             at_points,
             orientation,
+            is_consistent,
             is_ambiguous,
             radius,
             least_ratio,
@@ -187,13 +190,18 @@ impl LocalSurface {
         &self.at_points
     }
 
+    /// Whether noise is such that only the feet of the points tell their sides.
+    pub(crate) fn is_noisy(&self) -> bool {
+        is_noisy(self.ordered(), &self.at_points, self.patches.noise())
+    }
+
     /// Returns the outward normals of the points in the order in which they were given.
     pub(crate) fn oriented(&self) -> Oriented {
         let d = self.cloud.dimension();
         Oriented {
             normals: self.ordered.given_rows(&self.at_points.normals, d),
             how: self.orientation,
-            is_consistent: true,
+            is_consistent: self.is_consistent,
             is_ambiguous: self.ordered.given_rows(&self.is_ambiguous, 1),
         }
     }

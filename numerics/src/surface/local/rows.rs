@@ -36,7 +36,7 @@ impl PatchGeometry {
         points.flat_map(foot).collect()
     }
 
-    /// The same of ordered points in the order in which they were given.
+    /// Returns the geometry at ordered points in the order in which these were given.
     pub(super) fn given(&self, ordered: &TreeOrder) -> Self {
         let d = ordered.cloud.dimension();
         let curvatures = self.curvatures.as_ref().map(|own| CurvatureDeviations {

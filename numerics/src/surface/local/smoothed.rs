@@ -36,8 +36,8 @@ pub(crate) struct Smoothed {
 }
 
 impl Smoothed {
-    /// Moves points by their heights, if the noise, L, is such that their sides could not be told. Points
-    /// without a regression stay where they are.
+    /// Moves points by their heights, if the noise is such that their sides could not be told ([`is_noisy`]).
+    /// Points without a regression stay where they are.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -47,12 +47,10 @@ impl Smoothed {
         noise: f64,
         observer: &dyn Observer,
     ) -> Result<Option<Self>, NumericsError> {
-        let Placed { cloud, sampling } = points;
-        let scales = sampling.scales();
-        let step = if cloud.dimension() == 2 { scales.nearest } else { scales.spacing };
-        if noise < NOISY * step || !are_like_noise(&geometry.heights) {
+        if !is_noisy(points, geometry, noise) {
             return Ok(None);
         }
+        let cloud = points.cloud;
         let cloud = Cloud::new(geometry.feet(cloud, 0..cloud.n_points()), cloud.dimension())?;
         let sampling = Sampling::of(&cloud, observer)?;
         Ok(Some(Self { cloud, sampling }))
@@ -68,6 +66,13 @@ impl Smoothed {
 pub(crate) struct Placed<'a> {
     pub cloud: &'a Cloud,
     pub sampling: &'a Sampling,
+}
+
+/// Returns whether noise across the surface, L, is such that the points do not tell their sides.
+pub(super) fn is_noisy(points: Placed<'_>, geometry: &PatchGeometry, noise: f64) -> bool {
+    let scales = points.sampling.scales();
+    let step = if points.cloud.dimension() == 2 { scales.nearest } else { scales.spacing };
+    noise >= NOISY * step && are_like_noise(&geometry.heights)
 }
 
 /// Whether the sizes of heights are spread like those of noise, and not like those of two sheets.

@@ -80,11 +80,11 @@ impl SignatureSurface {
         let around = Neighbourhoods::of(sampling.neighbours(), cloud, count, observer)?;
         let quadrics = LocalQuadrics::of(cloud, &around, cloud, observer)?;
         let around = around.narrowed(n_around(cloud));
-        let told_by_regressions = match given {
+        let of_noisy_curve = match given {
             None => oriented_curve(cloud, &sampling, observer)?,
             Some(_) => None,
         };
-        let oriented = match told_by_regressions {
+        let oriented = match of_noisy_curve {
             Some(oriented) => oriented,
             None => {
                 let directions = directions(&signature, &sampling, &quadrics, observer)?;

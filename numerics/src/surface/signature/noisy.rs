@@ -27,5 +27,5 @@ pub(super) fn oriented_curve(
         return Ok(None);
     }
     let local = LocalSurface::of(cloud.clone(), sampling.clone(), Given::default(), observer)?;
-    Ok(local.smoothed(observer)?.is_some().then(|| local.oriented()))
+    Ok(local.is_noisy().then(|| local.oriented()))
 }

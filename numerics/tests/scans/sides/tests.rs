@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use gramian_numerics::observer::Unobserved;
+use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::surface::local::{Given, LocalSurface};
 
@@ -66,6 +67,21 @@ fn noisy_plane_curves_have_right_sides() {
             }
             assert!(all.wrong_of_unflagged() <= 0.01, "{n} points, noise {noise}: {all:?}");
             assert!(all.off_unflagged() <= 0.01 && all.ambiguous() <= 0.03, "{n}, {noise}: {all:?}");
+        }
+    }
+}
+
+#[test]
+fn unit_and_place_of_a_noisy_curve_do_not_matter() {
+    let sided = noisy_curves(300, 0.3, 1).remove(0).sided;
+    for way in [SideTally::dense, SideTally::local] {
+        let own = way(&sided);
+        for (unit, offset) in [(1.0, 1e6), (1e-9, 0.0), (1e9, -1e12)] {
+            let moved = sided.cloud.coordinates().iter().map(|x| unit * x + offset).collect();
+            let normals = sided.normals.clone();
+            let tally = way(&Sided { cloud: Cloud::new(moved, 2).unwrap(), normals });
+            let is_same = tally.n_flipped == own.n_flipped && tally.n_flagged.abs_diff(own.n_flagged) <= 2;
+            assert!(is_same, "{unit}, {offset}: {tally:?} and {own:?}");
         }
     }
 }
