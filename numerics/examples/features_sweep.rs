@@ -46,6 +46,15 @@ fn rows() -> Vec<Measured> {
         add(Feature::Draw(length), &[20, 100, 300, 1000, 3000], &[0.1, 1.0]);
     }
     add(Feature::Clusters, &[100, 300, 1000, 3000], &[0.01, 0.1]);
+    for dimension in [1, 2, 3] {
+        for n_points in [100u32, 300, 1000] {
+            for n_per_wave in [2.0, 3.0, 4.0, 5.0] {
+                let length = n_per_wave / f64::powf(f64::from(n_points), 1.0 / dimension as f64);
+                let length = (1e4 * length).round() / 1e4;
+                add(Feature::Ripple { dimension, length }, &[n_points as usize], &[0.01]);
+            }
+        }
+    }
     rows
 }
 

@@ -3,6 +3,7 @@
 
 #![allow(dead_code, reason = "the example prints what the test does not ask")]
 
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use gramian_numerics::points::cloud::Cloud;
@@ -33,6 +34,8 @@ pub enum Feature {
     Draw(f64),
     /// The function `sin 6x + cos 5y`, with most sensors in three clusters.
     Clusters,
+    /// The function `sin 3x + y` in the given dimension, with a small wave of this length along every axis.
+    Ripple { dimension: usize, length: f64 },
 }
 
 /// A field with its measurement: number of sensors and noise.
@@ -129,7 +132,7 @@ impl Feature {
         match self {
             Self::Bump(_) | Self::Draw(_) | Self::Clusters => 2,
             Self::Spot(_) => 3,
-            Self::Step(d) | Self::Kink(d) | Self::Sine(d) => d,
+            Self::Step(d) | Self::Kink(d) | Self::Sine(d) | Self::Ripple { dimension: d, .. } => d,
         }
     }
 
@@ -153,7 +156,7 @@ impl Feature {
             Self::Bump(width) => squared(x, &BUMP) < (2.0 * width).powi(2),
             Self::Spot(width) => squared(x, &SPOT) < (2.0 * width).powi(2),
             Self::Step(_) | Self::Kink(_) => across(x).abs() < 0.05,
-            Self::Sine(_) | Self::Draw(_) | Self::Clusters => false,
+            Self::Sine(_) | Self::Draw(_) | Self::Clusters | Self::Ripple { .. } => false,
         }
     }
 
@@ -166,9 +169,16 @@ impl Feature {
             Self::Sine(_) => (3.0 * x[0]).sin() + x[1],
             Self::Draw(_) => waves.at(x),
             Self::Clusters => (6.0 * x[0]).sin() + (5.0 * x[1]).cos(),
+            Self::Ripple { length, .. } => {
+                let ripple: f64 = x.iter().map(|x| (TAU * x / length).sin()).sum();
+                (3.0 * x[0]).sin() + x[x.len() - 1] + RIPPLE * ripple
+            }
         }
     }
 }
+
+/// Amplitude of a ripple. With 0.3, two and more points a wave are told from noise.
+const RIPPLE: f64 = 0.1;
 
 const BUMP: [f64; 2] = [0.6, 0.4];
 const SPOT: [f64; 3] = [0.48, 0.6, 0.64];

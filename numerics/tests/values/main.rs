@@ -162,6 +162,33 @@ fn what_is_local_or_drowned_in_noise_is_learned() {
 }
 
 #[test]
+fn detail_that_is_taken_for_noise_is_named() {
+    // With two to four points a wave, the likelihood prefers a long length scale and more noise. Then 14 to
+    // 46 % of the function is covered, which nothing told before. Of ten draws, seven to ten are named.
+    let ripple = |dimension, length| Feature::Ripple { dimension, length };
+    let ripples = [
+        (ripple(1, 0.0133), 300),
+        (ripple(1, 0.003), 1000),
+        (ripple(2, 0.0632), 1000),
+        (ripple(3, 0.2988), 300),
+        (ripple(3, 0.2), 1000),
+    ];
+    // Noise that is as large as the field or larger is no detail.
+    let noisy = [(Feature::Sine(3), 1.0), (Feature::Sine(2), 0.1), (Feature::Draw(0.3), 1.0)];
+    let ripples = ripples.map(|(feature, n_points)| Measured { feature, n_points, noise: 0.01 });
+    let noisy = noisy.map(|(feature, noise)| Measured { feature, n_points: 1000, noise });
+    let cases: Vec<Measured> = ripples.into_iter().chain(noisy).collect();
+    let bands: Vec<Bands> = cases.par_iter().map(|case| case.bands(By::Default, 6)).collect();
+    let (of_ripples, of_noisy) = bands.split_at(ripples.len());
+    for (case, bands) in ripples.iter().zip(of_ripples) {
+        assert!(bands.misfits > 0.6, "{case:?}: {bands:?}");
+    }
+    for (case, bands) in noisy.iter().zip(of_noisy) {
+        assert!(bands.misfits == 0.0, "{case:?}: {bands:?}");
+    }
+}
+
+#[test]
 fn operators_that_are_off_by_half_are_flagged_whatever_the_kernel() {
     let smooth = [Family::Gauss, Family::InverseMultiquadric, Family::Laplace { epsilon: 1.0 }];
     let rough = [Family::Matern { order: 1 }, Family::Matern { order: 2 }, Family::Matern { order: 4 }];

@@ -16,7 +16,7 @@ use gramian_numerics::regression::selection::{
     ScalePrior, Selection, Variation, learn, select,
 };
 use gramian_numerics::regression::solver::trend::Mean;
-use gramian_numerics::regression::solver::{Solver, System};
+use gramian_numerics::regression::solver::{Disagreement, Solver, System};
 use gramian_numerics::regression::sums::jets::JetOrder;
 use gramian_numerics::regression::sums::regularization::Regularization;
 
@@ -112,7 +112,7 @@ pub struct Posterior {
 }
 
 pub fn posterior(by: By, cloud: Arc<Cloud>, values: &[f64], at: &Cloud) -> Posterior {
-    let Chosen { kernel, ratio, variance, has_place, copies } = chosen(by, &cloud, values);
+    let Chosen { kernel, ratio, variance, is_contradicted, copies } = chosen(by, &cloud, values);
     let (without, merge) = Merge::copies(&cloud, &copies);
     let (cloud, values) = (Arc::new(without), &merge.mean(values)[..]);
     let alpha = Regularization::uniform(ratio).unwrap();
@@ -122,7 +122,7 @@ pub fn posterior(by: By, cloud: Arc<Cloud>, values: &[f64], at: &Cloud) -> Poste
     let means = u.at(at, JetOrder::Value, &Unobserved).unwrap().values();
     let trend = u.solution.trend.as_ref();
     let variances = variances_with_mean(&u.solver, trend, at, &Unobserved).unwrap();
-    let has_misfit = has_place || u.solution.disagreement(values.len(), variance).is_some();
+    let has_misfit = is_contradicted || u.solution.disagreement(values.len(), variance).is_some();
     Posterior { means, variances: variances.scaled(variance).latent, has_misfit }
 }
 
@@ -132,8 +132,8 @@ struct Chosen {
     /// Noise over variance.
     ratio: f64,
     variance: f64,
-    /// Whether the values contradict the kernel at some place.
-    has_place: bool,
+    /// Whether near values contradict the kernel together, at some place or everywhere.
+    is_contradicted: bool,
     copies: Vec<RowCopy>,
 }
 
@@ -143,9 +143,10 @@ fn chosen(by: By, cloud: &Cloud, values: &[f64]) -> Chosen {
     let learned = learn(Observed { cloud, sampling: &sampling, values, noise, mean }, &Unobserved).unwrap();
     let By::Criterion(criterion) = by else {
         let kernel = learned.kernel(1.0).unwrap();
-        let has_place = learned.disagreement.is_some_and(|found| found.place.is_some());
+        let is_near = |found: &Disagreement| found.place.is_some() || found.autocorrelation.is_some();
+        let is_contradicted = learned.disagreement.as_ref().is_some_and(is_near);
         let Learned { ratio, variance, copies, .. } = learned;
-        return Chosen { kernel, ratio, variance, has_place, copies };
+        return Chosen { kernel, ratio, variance, is_contradicted, copies };
     };
     let kernel = Kernel::new(learned.family, learned.length_scale, learned.variance).unwrap();
     let start = Hyperparameters::of(&kernel, Regularization::Uniform(learned.ratio * learned.variance));
@@ -175,5 +176,5 @@ fn chosen(by: By, cloud: &Cloud, values: &[f64]) -> Chosen {
     let kernel = Kernel::new(found.family, found.length_scales[0], 1.0).unwrap();
     // The least noise with which many points can be factorized.
     let ratio = (noise / found.variance).max(1e-10);
-    Chosen { kernel, ratio, variance: found.variance, has_place: false, copies }
+    Chosen { kernel, ratio, variance: found.variance, is_contradicted: false, copies }
 }

@@ -9,7 +9,7 @@ use super::schemas::CloudIdSchema;
 use gramian_host::json_members;
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::operators::{RowKind, Stencils};
-use gramian_numerics::regression::solver::{Disagreement, Outlier, Place};
+use gramian_numerics::regression::solver::{Autocorrelation, Disagreement, Outlier, Place};
 
 /// The factorization of the Gram matrix.
 ///
@@ -239,16 +239,21 @@ impl Diagnostics {
     /// Warns that values contradict kernel and noise, and suggests a remedy.
     pub fn warn_of_misfit(&mut self, found: Disagreement, remedy: &str) {
         let spread = found.mean_square.sqrt();
-        let detail = match (found.outlier, found.place) {
-            (Some(Outlier { point, deviations }), _) => format!(
+        let detail = match (found.outlier, found.place, found.autocorrelation) {
+            (Some(Outlier { point, deviations }), _, _) => format!(
                 "the value of point {point} is {deviations:.1} deviations from what others say of it, and all are {spread:.1} in root mean \
                  square; {remedy}"
             ),
-            (None, Some(Place { point, n_points, deviations })) => format!(
+            (None, Some(Place { point, n_points, deviations }), _) => format!(
                 "the {n_points} values around point {point} are {deviations:.1} deviations from what others say \
                  of them in root mean square, and all are {spread:.1}; {remedy}"
             ),
-            (None, None) => format!(
+            (None, None, Some(Autocorrelation { coefficient, n_pairs })) => format!(
+                "values of nearest points are off in the same direction (correlation {coefficient:.2} over {n_pairs} pairs): detail finer than \
+                 the length scale is taken for noise, and deviations of the function leave it out; add points where detail matters, or use a \
+                 kernel with a shorter length scale"
+            ),
+            (None, None, None) => format!(
                 "values are {spread:.1} deviations from what others say of them in root mean square; {remedy}"
             ),
         };

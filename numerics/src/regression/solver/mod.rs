@@ -31,7 +31,7 @@ pub(crate) use factorized::SMALLEST_PIVOT;
 pub use factorized::{Method, Remaining, Solver, Workspace};
 pub use landmark::{expected_landmarks, probe_price};
 pub(crate) use solution::MAX_RELATIVE_RESIDUAL;
-pub use solution::{Disagreement, Known, Outlier, Place, Solution, Sought};
+pub use solution::{Autocorrelation, Disagreement, Known, Outlier, Place, Solution, Sought};
 pub use system::System;
 pub(crate) use whitening::Whitened;
 

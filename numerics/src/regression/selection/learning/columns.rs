@@ -28,6 +28,10 @@ use crate::regression::sums::regularization::Regularization;
 const MAX_ROWS: usize = 2000;
 const MAX_COLUMNS: usize = 16;
 
+/// Number of rows that each column needs beside the least number of values. With four, a table of six columns
+/// had bars that cover 85 %.
+const ROWS_PER_COLUMN: usize = 5;
+
 /// Largest dimension of places.
 const MAX_PLACE_DIMENSION: usize = 3;
 
@@ -55,11 +59,14 @@ const VARIANCES: f64 = 1e3;
 const LEAST_NOISE: f64 = 1e-8;
 const MOST_NOISE: f64 = 10.0;
 
-/// Returns whether a cloud is a table, for whose columns [`super::learn`] tries a length scale each: 2 to 16
-/// columns and at most 2,000 rows. Up to three columns with spreads alike are the coordinates of places.
+/// Returns whether a cloud is a table, for whose columns [`super::learn`] tries a length scale each.
+///
+/// It has 2 to 16 columns, at most 2,000 rows, and at least 8 rows and 5 more for each column. Up to three
+/// columns with spreads alike are the coordinates of places.
 pub fn is_table(cloud: &Cloud) -> bool {
     let (n, d) = (cloud.n_points(), cloud.dimension());
-    let is_affordable = n <= MAX_ROWS && (2..=MAX_COLUMNS).contains(&d) && n >= LEAST_VALUES + 2 * d;
+    let is_affordable =
+        n <= MAX_ROWS && (2..=MAX_COLUMNS).contains(&d) && n >= LEAST_VALUES + ROWS_PER_COLUMN * d;
     is_affordable && (d > MAX_PLACE_DIMENSION || units_differ(&widths(cloud)))
 }
 
@@ -81,16 +88,29 @@ pub(super) fn decided<'a>(values: &'a Values<'a>, observer: &dyn Observer) -> Re
     let (comparison, decided) = decided_alike(values, observer)?;
     let (mut best, table) = (Best { values, comparison, decided }, Table::of(values));
     if units_differ(&widths(values.observed.cloud)) {
-        best = best.or(&table.units(), GAIN_OF_UNITS, observer)?;
+        let units = Measure { scales: table.units(), least_gain: GAIN_OF_UNITS, n_learned: 0 };
+        best = best.or(&units, observer)?;
     }
     let scales = match &best.decided {
         Some(decided) => table.scales(decided, observer)?,
         None => None,
     };
     if let Some(scales) = scales {
-        best = best.or(&scales, GAIN_OF_SCALE * table.n_further(), observer)?;
+        let n_learned = table.varying().count();
+        let least_gain = GAIN_OF_SCALE * table.n_further();
+        best = best.or(&Measure { scales, least_gain, n_learned }, observer)?;
     }
     Ok((best.comparison, best.decided))
+}
+
+/// A measure of nearness that is tried.
+struct Measure {
+    /// Scales of the columns, `[d]`.
+    scales: Vec<f64>,
+    /// Least gain in log likelihood for which it is taken, in nats.
+    least_gain: f64,
+    /// Number of scales that were learned from the values.
+    n_learned: usize,
 }
 
 /// The best measure of nearness so far.
@@ -102,12 +122,25 @@ struct Best<'a> {
 
 impl Best<'_> {
     /// Returns what columns in units of these scales decide if that gains enough, or else itself.
-    fn or(self, scales: &[f64], least_gain: f64, observer: &dyn Observer) -> Result<Self> {
-        let comparison = Comparison::of_columns(self.values, scales, observer)?;
-        let Some(decided) = comparison.decided(observer)? else { return Ok(self) };
+    fn or(self, measure: &Measure, observer: &dyn Observer) -> Result<Self> {
+        let comparison = Comparison::of_columns(self.values, &measure.scales, observer)?;
+        let Some(mut decided) = comparison.decided(observer)? else { return Ok(self) };
         let before = self.decided.as_ref().map_or(f64::INFINITY, |best| best.negative_log);
-        let is_better = before - decided.negative_log >= least_gain;
-        Ok(if is_better { Self { comparison, decided: Some(decided), ..self } } else { self })
+        if before - decided.negative_log < measure.least_gain {
+            return Ok(self);
+        }
+        decided.learned.variance *= self.of_few_rows(measure.n_learned);
+        Ok(Self { comparison, decided: Some(decided), ..self })
+    }
+
+    /// Returns by how much n rows that also found these scales make the variance too small: `n/(n − k)`, as
+    /// a fit with k parameters does. 1 where the noise is known, and the variance with it.
+    fn of_few_rows(&self, n_learned: usize) -> f64 {
+        let n = self.values.observed.cloud.n_points();
+        match self.values.observed.noise {
+            Noise::Unknown => n as f64 / (n - n_learned) as f64,
+            Noise::Uniform(_) | Noise::PerPoint(_) => 1.0,
+        }
     }
 }
 

@@ -4,6 +4,7 @@ use faer::Mat;
 use rayon::prelude::*;
 
 use super::Learned;
+use super::autocorrelation::Pairs;
 use super::group::{Group, Nugget, Whitened};
 use super::order::{Conditional, PLACE};
 use super::replicates::Scatter;
@@ -219,7 +220,8 @@ impl<'a> Evidence<'a> {
             rest.iter().map(|z| z.abs()).enumerate().max_by(|(_, a), (_, b)| a.total_cmp(b))?;
         let outlier = Outlier { point: self.points[at % n], deviations: largest * in_deviations };
         let place = self.place(rest, in_deviations);
-        Disagreement { outlier: Some(outlier), place, mean_square }.if_any(n_degrees)
+        let autocorrelation = Pairs::of(&self.values.observed, &self.points).autocorrelation(rest, n);
+        Disagreement { outlier: Some(outlier), place, autocorrelation, mean_square }.if_any(n_degrees)
     }
 
     fn n_functions(&self) -> usize {

@@ -12,6 +12,7 @@
 //! place is outvoted. The result therefore has to agree with every place (agreement.rs).
 
 mod agreement;
+mod autocorrelation;
 mod columns;
 mod comparison;
 mod grid;

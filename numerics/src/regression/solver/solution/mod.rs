@@ -18,7 +18,7 @@ use crate::observer::{Observer, Stage};
 use crate::regression::sums::jets::{JetOrder, Jets};
 use candidate::Candidate;
 pub(crate) use candidate::MAX_RELATIVE_RESIDUAL;
-pub use residuals::{Disagreement, Outlier, Place};
+pub use residuals::{Autocorrelation, Disagreement, Outlier, Place};
 
 /// Weights `Λ = (K + αI)⁻¹ Y` with their residual and norms. If the function has a mean, Y is the values
 /// without it.

@@ -85,6 +85,15 @@ pub struct Place {
     pub deviations: f64,
 }
 
+/// Correlation of near values, without what kernel and noise explain of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Autocorrelation {
+    /// 0 for independent values, 1 for equal ones.
+    pub coefficient: f64,
+    /// Number of pairs of nearest neighbours.
+    pub n_pairs: usize,
+}
+
 /// Disagreement of values with the kernel and noise of their fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disagreement {
@@ -92,6 +101,9 @@ pub struct Disagreement {
     pub outlier: Option<Outlier>,
     /// The place that is farthest off, if places were examined and one is off.
     pub place: Option<Place>,
+    /// Correlation of nearest neighbours, if they were examined and are correlated. Detail is then taken for
+    /// noise.
+    pub autocorrelation: Option<Autocorrelation>,
     /// Mean square of standardised residuals: each value without what those before it predict, in units of
     /// the deviations that these leave. It is 1 where kernel and noise are right.
     pub mean_square: f64,
@@ -103,7 +115,8 @@ impl Disagreement {
     pub(crate) fn if_any(self, n_degrees: usize) -> Option<Self> {
         let outlier = self.outlier.filter(|outlier| outlier.deviations > OUTLYING);
         let most = MEAN_SQUARE + 5.0 * (2.0 / n_degrees as f64).sqrt();
-        let is_any = outlier.is_some() || self.place.is_some() || self.mean_square > most;
+        let is_local = self.place.is_some() || self.autocorrelation.is_some();
+        let is_any = outlier.is_some() || is_local || self.mean_square > most;
         is_any.then_some(Self { outlier, ..self })
     }
 }
@@ -115,7 +128,8 @@ impl Solution {
         let n_degrees = n_points.checked_sub(n_functions).filter(|&n_degrees| n_degrees > 0)?;
         let scaled = |outlier: Outlier| Outlier { deviations: outlier.deviations / scale.sqrt(), ..outlier };
         let mean_square = self.energy / scale / n_degrees as f64;
-        Disagreement { outlier: self.outlier.map(scaled), place: None, mean_square }.if_any(n_degrees)
+        Disagreement { outlier: self.outlier.map(scaled), place: None, autocorrelation: None, mean_square }
+            .if_any(n_degrees)
     }
 }
 
