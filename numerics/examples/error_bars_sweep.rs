@@ -2,7 +2,7 @@
 //! values within the error bars.
 //!
 //! `cargo run --release --example error_bars_sweep [points per row]`, 10,000 by
-//! default. It takes a few minutes.
+//! default. It takes about an hour of one core.
 
 #[path = "../tests/error_bars/carved.rs"]
 mod carved;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use gramian_numerics::points::cloud::Cloud;
 
 use crate::common::random::Random;
-use crate::posterior::{By, Found, Posterior, posterior};
+use crate::posterior::{By, Draw, Found, Posterior, posterior};
 
 const N_QUERIES: usize = 300;
 
@@ -25,17 +25,10 @@ pub struct Repeated {
 impl Repeated {
     /// Coverage of the 95 % bands, and root mean square error, over draws.
     pub fn found(&self, n_draws: u64) -> Found {
-        let (mut n_within, mut squares) = (0, 0.0);
-        for draw in 1..=n_draws {
-            let (within, square) = self.draw(draw);
-            n_within += within;
-            squares += square;
-        }
-        let n = (n_draws as usize * N_QUERIES) as f64;
-        Found { coverage: 100.0 * n_within as f64 / n, error: (squares / n).sqrt() }
+        Found::over((1..=n_draws).map(|draw| self.draw(draw)))
     }
 
-    fn draw(&self, seed: u64) -> (usize, f64) {
+    fn draw(&self, seed: u64) -> Draw {
         let mut random = Random(seed);
         let mut places = |n: usize| -> Vec<f64> { (0..2 * n).map(|_| random.uniform()).collect() };
         let (mut points, queries) = (places(self.n_points), places(N_QUERIES));
@@ -51,7 +44,6 @@ impl Repeated {
         let (cloud, at) = (Arc::new(Cloud::new(points, 2).unwrap()), Cloud::new(queries, 2).unwrap());
         let Posterior { means, variances, .. } = posterior(self.by, cloud, &values, &at);
         let errors: Vec<f64> = means.iter().zip(at.points()).map(|(u, x)| u - field(x)).collect();
-        let n_within = errors.iter().zip(&variances).filter(|(e, v)| e.abs() <= 1.96 * v.sqrt()).count();
-        (n_within, errors.iter().map(|e| e * e).sum())
+        Draw::of(&errors, &variances, 1.0)
     }
 }

@@ -66,18 +66,10 @@ impl Sensors {
 
     /// Coverage and error at random queries among the sensors, over several draws.
     pub fn found(&self, by: By, n_draws: usize) -> Found {
-        let (mut n_within, mut squares) = (0, 0.0);
-        for draw in 0..n_draws {
-            let (within, square) = self.draw(by, draw);
-            n_within += within;
-            squares += square;
-        }
-        let n = (n_draws * N_QUERIES) as f64;
-        Found { coverage: 100.0 * n_within as f64 / n, error: (squares / n).sqrt() }
+        Found::over((0..n_draws).map(|draw| self.draw(by, draw)))
     }
 
-    /// The number of true values within the bands, and the sum of the squared errors over the spread.
-    fn draw(&self, by: By, draw: usize) -> (usize, f64) {
+    fn draw(&self, by: By, draw: usize) -> Draw {
         let mut random = Random((1000 * draw + self.n_points) as u64 + 1);
         let d = self.dimension;
         let mut places =
@@ -95,10 +87,39 @@ impl Sensors {
         let (cloud, at) = (Arc::new(Cloud::new(points, d).unwrap()), Cloud::new(queries, d).unwrap());
 
         let Posterior { means: found, variances, .. } = posterior(by, cloud, &values, &at);
-        let within = |((f, t), v): ((&f64, &f64), &f64)| (f - t).abs() <= 1.96 * v.sqrt();
-        let n_within = found.iter().zip(&truth).zip(&variances).filter(|&entry| within(entry)).count();
-        let unit = self.factor * spread;
-        (n_within, found.iter().zip(&truth).map(|(f, t)| ((f - t) / unit).powi(2)).sum())
+        let errors: Vec<f64> = found.iter().zip(&truth).map(|(f, t)| f - t).collect();
+        Draw::of(&errors, &variances, self.factor * spread)
+    }
+}
+
+/// Errors at the queries of one draw.
+#[derive(Debug, Clone, Copy)]
+pub struct Draw {
+    n_queries: usize,
+    /// Number of true values within ±1.96 deviations.
+    n_within: usize,
+    /// Sum of the squares of the errors over the unit.
+    squares: f64,
+}
+
+impl Draw {
+    pub fn of(errors: &[f64], variances: &[f64], unit: f64) -> Self {
+        let is_within = |&(error, variance): &(&f64, &f64)| error.abs() <= 1.96 * variance.sqrt();
+        Self {
+            n_queries: errors.len(),
+            n_within: errors.iter().zip(variances).filter(is_within).count(),
+            squares: errors.iter().map(|error| (error / unit).powi(2)).sum(),
+        }
+    }
+}
+
+impl Found {
+    pub fn over(draws: impl Iterator<Item = Draw>) -> Self {
+        let sum = draws.fold((0, 0, 0.0), |(n, within, squares), draw| {
+            (n + draw.n_queries, within + draw.n_within, squares + draw.squares)
+        });
+        let (n, n_within, squares) = (sum.0 as f64, sum.1, sum.2);
+        Self { coverage: 100.0 * n_within as f64 / n, error: (squares / n).sqrt() }
     }
 }
 

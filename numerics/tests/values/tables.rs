@@ -6,7 +6,7 @@ use std::sync::Arc;
 use gramian_numerics::points::cloud::Cloud;
 
 use crate::common::random::Random;
-use crate::posterior::{By, Found, Posterior, posterior};
+use crate::posterior::{By, Draw, Found, Posterior, posterior};
 
 const N_QUERIES: usize = 300;
 const N_COLUMNS: usize = 8;
@@ -24,18 +24,10 @@ pub struct Table {
 impl Table {
     /// Coverage of the 95 % bands, and root mean square error over the spread of the function, over draws.
     pub fn found(&self, n_draws: u64) -> Found {
-        let (mut n_within, mut squares) = (0, 0.0);
-        for draw in 1..=n_draws {
-            let (within, square) = self.draw(draw);
-            n_within += within;
-            squares += square;
-        }
-        let n = (n_draws as usize * N_QUERIES) as f64;
-        Found { coverage: 100.0 * n_within as f64 / n, error: (squares / n).sqrt() }
+        Found::over((1..=n_draws).map(|draw| self.draw(draw)))
     }
 
-    /// Returns the number of values within their bands, and the sum of the squares of errors over spreads.
-    fn draw(&self, seed: u64) -> (usize, f64) {
+    fn draw(&self, seed: u64) -> Draw {
         let mut random = Random(seed);
         let mut rows = |n: usize| -> Vec<f64> { (0..N_COLUMNS * n).map(|_| random.uniform()).collect() };
         let function = |x: &[f64]| {
@@ -54,7 +46,6 @@ impl Table {
         let mean = truth.iter().sum::<f64>() / N_QUERIES as f64;
         let spread = truth.iter().map(|t| (t - mean).powi(2)).sum::<f64>() / N_QUERIES as f64;
         let errors: Vec<f64> = means.iter().zip(&truth).map(|(u, t)| u - t).collect();
-        let n_within = errors.iter().zip(&variances).filter(|(e, v)| e.abs() <= 1.96 * v.sqrt()).count();
-        (n_within, errors.iter().map(|e| e * e / spread).sum())
+        Draw::of(&errors, &variances, spread.sqrt())
     }
 }
