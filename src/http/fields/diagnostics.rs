@@ -100,7 +100,7 @@ pub enum WarningCode {
     FarVertices,
     /// Values contradict kernel and noise, so deviations are too short. If the warning names a value, perhaps
     /// only around it.
-    Misfit,
+    PoorFit,
     /// Rows repeat points and values of an earlier one. They count once when kernel and noise are learned.
     RepeatedRows,
     /// Coordinates of the points have so different spreads that one length scale does not serve them all.
@@ -237,7 +237,7 @@ impl Diagnostics {
     }
 
     /// Warns that values contradict kernel and noise, and suggests a remedy.
-    pub fn warn_of_misfit(&mut self, found: Disagreement, remedy: &str) {
+    pub fn warn_of_poor_fit(&mut self, found: Disagreement, remedy: &str) {
         let spread = found.mean_square.sqrt();
         let detail = match (found.outlier, found.place, found.autocorrelation) {
             (Some(Outlier { point, deviations }), _, _) => format!(
@@ -257,7 +257,7 @@ impl Diagnostics {
                 "values are {spread:.1} deviations from what others say of them in root mean square; {remedy}"
             ),
         };
-        self.warnings.push(Warning { code: WarningCode::Misfit, detail });
+        self.warnings.push(Warning { code: WarningCode::PoorFit, detail });
     }
 
     /// Warns that neighbourhoods are too small.

@@ -230,7 +230,7 @@ impl Applying<'_> {
             Operator::SurfaceGradient => vec![m, d],
         };
         let mut diagnostics = fits.main.diagnostics(&report, m);
-        fits.main.warn_of_misfit(&mut diagnostics, report.disagreement, work.request.has_deviations);
+        fits.main.warn_of_poor_fit(&mut diagnostics, report.disagreement, work.request.has_deviations);
         diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)));
         AppliedAnswer {
             values: surface.per_query(values, &shape),

@@ -15,8 +15,8 @@ use gramian_numerics::regression::sums::regularization::Regularization;
 const ILL_CONDITIONED: f64 = 1e-13;
 
 const TOO_SMALL: &str = "squares of the values underflow float64: their variance is set to 1e-290, and deviations are too large; scale the values";
-const MISFIT_OF_LEARNED: &str = "deviations there may be too small: check these values, or use a kernel with a shorter length scale or less smoothness";
-const MISFIT_OF_GIVEN: &str = "deviations are too small: leave out kernel and alpha so that they are learned, or raise variance and alpha";
+const POOR_FIT_OF_LEARNED: &str = "deviations there may be too small: check these values, or use a kernel with a shorter length scale or less smoothness";
+const POOR_FIT_OF_GIVEN: &str = "deviations are too small: leave out kernel and alpha so that they are learned, or raise variance and alpha";
 
 impl FitModel {
     /// Returns the diagnostics of this fit and of the function or surface served from it.
@@ -133,7 +133,7 @@ impl FitModel {
     /// The contradiction is that of the solved function, or else the one found when learning. Where kernel
     /// and noise are given, only answers with deviations get the warning. Without deviations, an answer
     /// depends only on the ratio of the two.
-    pub fn warn_of_misfit(
+    pub fn warn_of_poor_fit(
         &self,
         diagnostics: &mut Diagnostics,
         of_solution: Option<Disagreement>,
@@ -149,8 +149,8 @@ impl FitModel {
         let is_learned = plan.process.is_learned;
         let found = of_solution.or_else(|| plan.disagreement());
         let Some(found) = found.filter(|_| is_learned || has_deviations) else { return };
-        let remedy = if is_learned { MISFIT_OF_LEARNED } else { MISFIT_OF_GIVEN };
-        diagnostics.warn_of_misfit(found, remedy);
+        let remedy = if is_learned { POOR_FIT_OF_LEARNED } else { POOR_FIT_OF_GIVEN };
+        diagnostics.warn_of_poor_fit(found, remedy);
     }
 }
 

@@ -31,7 +31,7 @@ impl Fits {
         })?;
         let mut diagnostics = fitted.diagnostics(&found.report, request.queries.n_points());
         diagnostics.warn_of_unsettled(found.report.unsettled);
-        fitted.warn_of_misfit(&mut diagnostics, found.report.disagreement, has_deviations(request));
+        fitted.warn_of_poor_fit(&mut diagnostics, found.report.disagreement, has_deviations(request));
         Ok((found, diagnostics))
     }
 
@@ -51,7 +51,7 @@ impl Fits {
         let found = found.map_err(|error| fitted.refused(error))?;
         let mut diagnostics = fitted.diagnostics(&found.report, request.queries.n_points());
         if let Some(disagreement) = found.report.disagreement {
-            fitted.warn_of_misfit(&mut diagnostics, Some(disagreement), has_deviations(request));
+            fitted.warn_of_poor_fit(&mut diagnostics, Some(disagreement), has_deviations(request));
         }
         Ok((found, diagnostics))
     }

@@ -1,4 +1,4 @@
-//! Warnings of misfit: values that contradict kernel and noise.
+//! Warnings of a poor fit: values that contradict kernel and noise.
 
 use serde_json::{Value, json};
 
@@ -20,11 +20,11 @@ fn with(body: &Value, more: Value) -> Value {
     body
 }
 
-/// Returns the details of the misfit warnings.
-fn misfits(answer: &Value) -> Vec<String> {
+/// Returns the details of these warnings.
+fn poor_fits(answer: &Value) -> Vec<String> {
     let warnings = answer["diagnostics"]["warnings"].as_array().unwrap();
-    let of_misfit = warnings.iter().filter(|warning| warning["code"] == "misfit");
-    of_misfit.map(|warning| warning["detail"].as_str().unwrap().to_owned()).collect()
+    let of_poor_fit = warnings.iter().filter(|warning| warning["code"] == "poor_fit");
+    of_poor_fit.map(|warning| warning["detail"].as_str().unwrap().to_owned()).collect()
 }
 
 #[tokio::test]
@@ -33,7 +33,7 @@ async fn values_that_are_explained_have_no_warning() {
     let body = with(&measured(300, 0.0), json!({"include": ["variance"]}));
     for more in [json!({}), json!({"solver": "local"}), json!({"mean": "linear"})] {
         let answer = server.post("/v1/posterior", &with(&body, more.clone())).await.expect_ok();
-        assert_eq!(misfits(&answer), Vec::<String>::new(), "{more}");
+        assert_eq!(poor_fits(&answer), Vec::<String>::new(), "{more}");
     }
 }
 
@@ -44,13 +44,13 @@ async fn one_wrong_value_is_named_whichever_solver_answers() {
     for route in ["/v1/posterior", "/v1/interpolation"] {
         for solver in ["dense", "local"] {
             let answer = server.post(route, &with(&body, json!({"solver": solver}))).await.expect_ok();
-            let found = misfits(&answer);
+            let found = poor_fits(&answer);
             assert_eq!(found.len(), 1, "{route}, {solver}: {answer}");
             assert!(found[0].contains("point 200 "), "{route}, {solver}: {}", found[0]);
         }
     }
     let answer = server.post("/v1/laplace-beltrami", &body).await.expect_ok();
-    assert!(misfits(&answer)[0].contains("point 200 "));
+    assert!(poor_fits(&answer)[0].contains("point 200 "));
 }
 
 #[tokio::test]
@@ -67,7 +67,7 @@ async fn a_place_that_no_kernel_explains_is_named_whichever_solver_answers() {
         let body = json!({"cloud": {"points": points}, "values": values, "queries": [[1.0, 0.0, 0.0]]});
         for solver in ["dense", "local"] {
             let answer = server.post("/v1/posterior", &with(&body, json!({"solver": solver}))).await;
-            let found = misfits(&answer.expect_ok());
+            let found = poor_fits(&answer.expect_ok());
             assert_eq!(found.len(), height as usize, "{solver}: {found:?}");
             assert!(found.iter().all(|detail| detail.contains("values around point")), "{found:?}");
         }
@@ -81,17 +81,17 @@ async fn a_given_kernel_is_told_where_deviations_are_asked_for() {
     let body = with(&measured(300, 0.0), given);
     // The noise of the values is a hundred times the deviation that alpha implies.
     let means = server.post("/v1/interpolation", &body).await.expect_ok();
-    assert_eq!(misfits(&means), Vec::<String>::new());
+    assert_eq!(poor_fits(&means), Vec::<String>::new());
     let answer = server.post("/v1/posterior", &with(&body, json!({"include": ["variance"]}))).await;
-    assert!(misfits(&answer.expect_ok())[0].contains("leave out kernel and alpha"));
+    assert!(poor_fits(&answer.expect_ok())[0].contains("leave out kernel and alpha"));
     let fitting = with(&body, json!({"alpha": 1e-4, "include": ["variance"]}));
     let answer = server.post("/v1/posterior", &fitting).await.expect_ok();
-    assert_eq!(misfits(&answer), Vec::<String>::new());
+    assert_eq!(poor_fits(&answer), Vec::<String>::new());
     // A batch of two lists, of which one is contradicted.
     let (wrong, right) = (&measured(300, 1.0)["values"], &body["values"]);
     let lists = with(&fitting, json!({"values": [right, wrong]}));
     let answer = server.post("/v1/posterior/batch", &lists).await.expect_ok();
-    assert_eq!(misfits(&answer).len(), 1);
+    assert_eq!(poor_fits(&answer).len(), 1);
 }
 
 #[tokio::test]
