@@ -160,7 +160,7 @@ async fn two_points_are_registered_beside_four_clouds_of_few_positions() {
     assert_eq!(statuses, [201; 5]);
 }
 
-/// Returns regions of no point as a body of `/v1/sides`. With links they are parts of one region.
+/// Returns regions of no point as a body of `/v1/tiles/sides`. With links they are parts of one region.
 fn empty_regions(n: usize, are_linked: bool) -> Vec<u8> {
     let region = json!({
         "n_points": 0, "n_signed": 0, "n_coarse": 0, "area": 0, "centre": [0, 0], "spread": 0,
@@ -174,7 +174,7 @@ fn empty_regions(n: usize, are_linked: bool) -> Vec<u8> {
 }
 
 async fn join_regions(process: &Process, key: &str, body: Vec<u8>) -> u16 {
-    let request = unpooled().post(process.url("/v1/sides")).bearer_auth(key);
+    let request = unpooled().post(process.url("/v1/tiles/sides")).bearer_auth(key);
     let request = request.header("content-type", "application/json").header("content-encoding", "zstd");
     request.body(body).send().await.unwrap().status().as_u16()
 }

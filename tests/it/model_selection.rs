@@ -22,7 +22,7 @@ async fn the_likeliest_kernel_is_found_and_used() {
     // 150 values less about ten functions determine a deviation to 6 %.
     assert!((0.08..0.125).contains(&noise), "{noise}");
     assert_eq!(answer["converged"], true);
-    assert_eq!(answer["gradient"].as_array().unwrap().len(), 3);
+    assert_eq!(answer["score_gradient"].as_array().unwrap().len(), 3);
     // The score is the likelihood of the posterior, and no other noise has a higher one.
     body["kernel"] = answer["kernel"].clone();
     body["mean"] = json!("constant");
@@ -37,7 +37,7 @@ async fn the_likeliest_kernel_is_found_and_used() {
             false => assert!(likelihood < score, "{factor}"),
         }
     }
-    let path = answer["path"].as_array().unwrap();
+    let path = answer["alpha_path"].as_array().unwrap();
     assert_eq!(path.len(), 61);
     assert!(path.iter().filter_map(|entry| entry["score"].as_f64()).all(|other| other <= score + 1e-6));
 }
@@ -83,8 +83,8 @@ async fn families_and_smoothness_are_compared() {
     let answer = server.post("/v1/model-selection", &body).await.expect_ok();
     let families = answer["families"].as_array().unwrap();
     assert_eq!(families.len(), 4);
-    assert_eq!(answer["gradient"].as_array().unwrap().len(), 3);
-    assert!(answer["gradient"][1].is_null());
+    assert_eq!(answer["score_gradient"].as_array().unwrap().len(), 3);
+    assert!(answer["score_gradient"][1].is_null());
     let best = families.iter().filter_map(|entry| entry["score"].as_f64()).fold(f64::MIN, f64::max);
     assert!((best - answer["score"].as_f64().unwrap()).abs() < 1e-9);
     for criterion in ["leave_one_out", "generalized_cross_validation"] {
@@ -119,7 +119,7 @@ async fn what_cannot_be_searched_is_refused() {
     let mut noisy = body.clone();
     noisy["noise_variances"] = json!(vec![0.01; 20]);
     let answer = server.post("/v1/model-selection", &noisy).await.expect_ok();
-    assert!(answer.get("alpha").is_none() && answer["path"].as_array().unwrap().is_empty());
+    assert!(answer.get("alpha").is_none() && answer["alpha_path"].as_array().unwrap().is_empty());
     noisy["vary"] = json!([free("alpha", 0.1, 1.0)]);
     server.post("/v1/model-selection", &noisy).await.expect_problem(422, "invalid-request");
 }
@@ -198,8 +198,8 @@ async fn bounds_that_meet_are_no_slope_and_noise_is_found_from_a_start_without()
     body["vary"] = json!([{"parameter": "length_scale", "min": 0.1, "max": 10},
         {"parameter": "variance", "min": 0.01, "max": 100}, {"parameter": "alpha", "min": 0.01, "max": 0.01}]);
     let answer = server.post("/v1/model-selection", &body).await.expect_ok();
-    assert_eq!(answer["converged"], true, "{}", answer["gradient"]);
-    assert!(answer["gradient"][2].as_f64().unwrap() > 1.0);
+    assert_eq!(answer["converged"], true, "{}", answer["score_gradient"]);
+    assert!(answer["score_gradient"][2].as_f64().unwrap() > 1.0);
 }
 
 #[tokio::test]
@@ -282,7 +282,7 @@ async fn the_columns_of_a_table_start_with_length_scales_of_their_own() {
     let answer = server.post("/v1/model-selection", &body).await.expect_ok();
     let scales = numbers(&answer["kernel"]["length_scales"]);
     assert!(scales[0] < 0.01 && scales[1] > 100.0 && scales[2] > 0.5, "{scales:?}");
-    assert_eq!(answer["gradient"].as_array().unwrap().len(), 5);
+    assert_eq!(answer["score_gradient"].as_array().unwrap().len(), 5);
     let noise = answer["alpha"].as_f64().unwrap().sqrt();
     assert!((0.07..0.14).contains(&noise), "{noise}");
     // One length scale for all may be asked for all the same.

@@ -109,14 +109,14 @@ async fn what_generated_clients_accept_is_acceptable() {
     let mut named = bodies["/v1/normals"].clone();
     named["operation"] = json!("compute_normals");
     bodies.insert("/v1/estimate", named);
-    bodies.insert("/v1/sides", json!({"tiles": [], "links": []}));
+    bodies.insert("/v1/tiles/sides", json!({"tiles": [], "links": []}));
     let tile = json!({"points": [[1, 0], [0, 1]], "normals": [[1, 0], [0, 1]]});
     let octagon: Vec<[f64; 2]> = [(1.0, 0.0), (0.7, 0.7)]
         .into_iter()
         .flat_map(|(x, y): (f64, f64)| [[x, y], [-y, x], [-x, -y], [y, -x]])
         .collect();
     bodies.insert("/v1/level-set", json!({"cloud": {"points": octagon}}));
-    bodies.insert("/v1/regions", json!({"cloud": tile, "own": [0]}));
+    bodies.insert("/v1/tiles/regions", json!({"cloud": tile, "own": [0]}));
     for (name, document) in
         [("3.1", gramian::http::openapi_json()), ("3.0", gramian::http::openapi_3_0_json())]
     {

@@ -82,11 +82,11 @@ async fn a_sphere_in_two_tiles_is_turned_outward() {
     let server = Server::start().await;
     let points = fibonacci_sphere(1000);
     let body = json!({"points": points, "noise_deviation": 0.0});
-    let coarse = server.post("/v1/coarse", &body).await.expect_ok();
+    let coarse = server.post("/v1/tiles/coarse", &body).await.expect_ok();
     let chosen: Vec<usize> = serde_json::from_value(coarse["points"].clone()).unwrap();
     assert_eq!((chosen.len(), &coarse["kernel"]["family"]), (600, &json!("laplace")));
     let few = json!({"points": points, "count": 16});
-    let few = server.post("/v1/coarse", &few).await.expect_ok();
+    let few = server.post("/v1/tiles/coarse", &few).await.expect_ok();
     assert_eq!(few["points"].as_array().unwrap().len(), 16);
     for side in [1.0, -1.0] {
         let (mut tiles, mut shared) = (Vec::new(), Vec::new());
@@ -97,7 +97,7 @@ async fn a_sphere_in_two_tiles_is_turned_outward() {
             let coarse: Vec<usize> = (0..part.len()).filter(is_coarse).collect();
             let cloud = json!({"points": part, "normals": normals});
             let body = json!({"cloud": cloud, "own": own, "coarse": coarse});
-            let answer = server.post("/v1/regions", &body).await.expect_ok();
+            let answer = server.post("/v1/tiles/regions", &body).await.expect_ok();
             let labels: Vec<i64> = serde_json::from_value(answer["labels"].clone()).unwrap();
             // One region, with the first points beyond it.
             assert!(own.iter().all(|&at| labels[at] == 0) && labels.contains(&-1));
@@ -109,7 +109,7 @@ async fn a_sphere_in_two_tiles_is_turned_outward() {
         }
         assert_eq!(shared, [true, true]);
         let body = json!({"tiles": tiles, "links": [{"first": 0, "second": 1}]});
-        let sides = server.post("/v1/sides", &body).await.expect_ok();
+        let sides = server.post("/v1/tiles/sides", &body).await.expect_ok();
         assert_eq!(sides, json!({"signs": [side as i8, side as i8], "are_doubtful": [false, false]}));
     }
 }
@@ -132,24 +132,24 @@ async fn tiles_that_cannot_be_are_refused_by_their_place() {
     let mut without_points = tile(0);
     without_points["regions"][0]["n_points"] = json!(0);
     let cases = [
-        ("/v1/regions", json!({"cloud": bare, "own": [0]}), "/cloud/normals"),
-        ("/v1/regions", json!({"cloud": cloud, "own": [1, 1]}), "/own/1"),
-        ("/v1/regions", json!({"cloud": cloud, "own": [0], "coarse": [60]}), "/coarse/0"),
-        ("/v1/coarse", json!({"points": points, "count": 0}), "/count"),
-        ("/v1/coarse", json!({"points": points, "noise_deviation": -1.0}), "/noise_deviation"),
-        ("/v1/coarse", json!({"points": points, "noise_deviation": 1e308}), "/noise_deviation"),
-        ("/v1/sides", json!({"tiles": [tile(0), tile(1)], "links": []}), "/tiles/1"),
-        ("/v1/sides", json!({"tiles": [tile(0), tile(0)], "links": [link(1), link(2)]}), "/links/1"),
-        ("/v1/sides", json!({"tiles": [tile(0), without_points], "links": []}), "/tiles/1/regions/0"),
+        ("/v1/tiles/regions", json!({"cloud": bare, "own": [0]}), "/cloud/normals"),
+        ("/v1/tiles/regions", json!({"cloud": cloud, "own": [1, 1]}), "/own/1"),
+        ("/v1/tiles/regions", json!({"cloud": cloud, "own": [0], "coarse": [60]}), "/coarse/0"),
+        ("/v1/tiles/coarse", json!({"points": points, "count": 0}), "/count"),
+        ("/v1/tiles/coarse", json!({"points": points, "noise_deviation": -1.0}), "/noise_deviation"),
+        ("/v1/tiles/coarse", json!({"points": points, "noise_deviation": 1e308}), "/noise_deviation"),
+        ("/v1/tiles/sides", json!({"tiles": [tile(0), tile(1)], "links": []}), "/tiles/1"),
+        ("/v1/tiles/sides", json!({"tiles": [tile(0), tile(0)], "links": [link(1), link(2)]}), "/links/1"),
+        ("/v1/tiles/sides", json!({"tiles": [tile(0), without_points], "links": []}), "/tiles/1/regions/0"),
     ];
     for (path, body, pointer) in cases {
         let problem = server.post(path, &body).await.expect_problem(422, "invalid-request");
         assert_eq!(problem["errors"][0]["pointer"], pointer, "{path}");
     }
     let body = json!({"cloud": cloud, "own": [], "alpha": 0.1});
-    let problem = server.post("/v1/regions", &body).await.expect_problem(422, "unsupported-by-solver");
+    let problem = server.post("/v1/tiles/regions", &body).await.expect_problem(422, "unsupported-by-solver");
     assert_eq!(problem["errors"][0]["pointer"], "/alpha");
-    let empty = server.post("/v1/regions", &json!({"cloud": cloud, "own": []})).await.expect_ok();
+    let empty = server.post("/v1/tiles/regions", &json!({"cloud": cloud, "own": []})).await.expect_ok();
     assert_eq!((&empty["regions"], &empty["n_edges"]), (&json!([]), &json!(0)));
 }
 
@@ -167,7 +167,7 @@ fn upper_half(change: impl Fn([f64; 3]) -> [f64; 3]) -> Value {
 async fn eight_equal_requests_for_regions_have_one_answer() {
     let server = Server::start().await;
     let body = upper_half(|x| x);
-    let asked = (0..8).map(|_| server.post("/v1/regions", &body));
+    let asked = (0..8).map(|_| server.post("/v1/tiles/regions", &body));
     let answers: Vec<Value> =
         futures_util::future::join_all(asked).await.into_iter().map(|answer| answer.expect_ok()).collect();
     assert!(answers.iter().all(|answer| answer == &answers[0]));
@@ -176,11 +176,11 @@ async fn eight_equal_requests_for_regions_have_one_answer() {
 #[tokio::test]
 async fn regions_follow_units_and_offsets() {
     let server = Server::start().await;
-    let plain = server.post("/v1/regions", &upper_half(|x| x)).await.expect_ok();
+    let plain = server.post("/v1/tiles/regions", &upper_half(|x| x)).await.expect_ok();
     let first = &plain["regions"][0];
     for (unit, offset) in [(1.0 / 4096.0, 0.0), (1048576.0, 0.0), (1.0, 1024.0)] {
         let body = upper_half(|x| x.map(|c| unit * c + offset));
-        let moved = server.post("/v1/regions", &body).await.expect_ok();
+        let moved = server.post("/v1/tiles/regions", &body).await.expect_ok();
         assert_eq!(moved["labels"], plain["labels"]);
         let region = &moved["regions"][0];
         assert_eq!(region["n_points"], first["n_points"]);

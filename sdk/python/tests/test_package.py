@@ -283,10 +283,10 @@ def test_a_selection_finds_what_explains_values(client: gramian.Client) -> None:
     assert np.sqrt(found.alpha) == pytest.approx(0.1, rel=0.3)
     assert found.mean_coefficients is None
     assert_shapes(found, gradient=(3,))
-    assert_shapes(found.path, alphas=found.path.scores.shape)
+    assert_shapes(found.alpha_path, alphas=found.alpha_path.scores.shape)
     assert_shapes(found.leave_one_out, means=(70,), variances=(70,), log_predictive_densities=(70,))
-    assert np.all(np.diff(found.path.alphas) > 0)
-    assert np.nanmax(found.path.scores) <= found.score + 1e-6
+    assert np.all(np.diff(found.alpha_path.alphas) > 0)
+    assert np.nanmax(found.alpha_path.scores) <= found.score + 1e-6
     assert [entry.family for entry in found.families] == [KernelFamily.GAUSS, KernelFamily.MATERN]
     assert found.score == max(entry.score for entry in found.families if isinstance(entry.score, float))
     assert found.diagnostics.alpha == 1e-2
@@ -311,11 +311,11 @@ def test_a_selection_tries_every_smoothness_within_bounds(client: gramian.Client
             values, vary={"nu": (0.5, 2.5), "length_scale": (0.1, 10)}, kernel="matern", alpha=0.01, criterion=criterion
         )
         assert [entry.nu for entry in found.families] == [0.5, 1.5, 2.5]
-        assert np.isnan(found.gradient).tolist() == [True, False]
+        assert np.isnan(found.score_gradient).tolist() == [True, False]
         if criterion is gramian.SelectionCriterion.LEAVE_ONE_OUT:
             assert found.score == pytest.approx(found.leave_one_out.log_predictive_densities.sum(), rel=1e-9)
     noise = cloud.select_model(values, noise_variances=np.full(40, 0.0025))
-    assert (noise.alpha, noise.path.alphas.shape, noise.path.scores.shape) == (None, (0,), (0,))
+    assert (noise.alpha, noise.alpha_path.alphas.shape, noise.alpha_path.scores.shape) == (None, (0,), (0,))
     assert "alpha" not in noise.fit
 
 

@@ -1,4 +1,4 @@
-//! `POST /v1/coarse`: the part of a cloud that says which side of its surface is outward.
+//! `POST /v1/tiles/coarse`: the part of a cloud that says which side of its surface is outward.
 
 use std::sync::Arc;
 
@@ -58,7 +58,7 @@ answer! {
 /// normals by it. Tiles of a cloud orient theirs alike if they all take that of the whole cloud.
 #[utoipa::path(
     post,
-    path = "/v1/coarse",
+    path = "/v1/tiles/coarse",
     tag = "tiles",
     request_body = CoarseRequest,
     responses((status = 200, description = "The coarse cloud", body = CoarseResponse), ComputeProblems)

@@ -1,4 +1,4 @@
-//! `POST /v1/regions`: what a tile knows of the sides of its surface.
+//! `POST /v1/tiles/regions`: what a tile knows of the sides of its surface.
 
 use std::sync::Arc;
 
@@ -53,9 +53,9 @@ operation! {
     /// Find the regions of a tile
     ///
     /// Joins the points of a tile whose normals agree with those of their neighbours, and sums up what
-    /// decides the side of each region. `POST /v1/sides` joins the regions of all tiles.
+    /// decides the side of each region. `POST /v1/tiles/sides` joins the regions of all tiles.
     pub async fn compute_regions(RegionsRequest) -> RegionsResponse;
-    path: "/v1/regions", tag: "tiles", answer: "The regions of the tile"
+    path: "/v1/tiles/regions", tag: "tiles", answer: "The regions of the tile"
 }
 
 /// A checked request for regions.

@@ -1,4 +1,4 @@
-//! `POST /v1/sides`: the sides of the regions of all tiles.
+//! `POST /v1/tiles/sides`: the sides of the regions of all tiles.
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ use gramian_numerics::orientation::tiles::{self, Tiling, TilingSize};
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SidesRequest {
-    /// The regions of each tile, as `POST /v1/regions` answers them.
+    /// The regions of each tile, as `POST /v1/tiles/regions` answers them.
     pub tiles: Vec<TileRegions>,
     /// Pairs of regions that have a point in common, counted on from one tile to the next.
     pub links: Vec<Link>,
@@ -68,7 +68,7 @@ answer! {
 /// surest borders, and each connected piece has the side that its volume or its coarse cloud says.
 #[utoipa::path(
     post,
-    path = "/v1/sides",
+    path = "/v1/tiles/sides",
     tag = "tiles",
     request_body = SidesRequest,
     responses((status = 200, description = "The sides of all regions", body = SidesResponse), ComputeProblems)

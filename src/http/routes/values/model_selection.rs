@@ -163,7 +163,7 @@ answer! {
         /// They are those of the criterion alone. Where length scales of axes vary, the prior may balance
         /// them. For `length_scales` without an axis, the derivative is in the logarithm of a common factor
         /// of all length scales. Null for `nu`, which takes steps.
-        gradient: Vec<Nullable> as Vec<Option<f64>>,
+        score_gradient: Vec<Nullable> as Vec<Option<f64>>,
         /// True if no slope is left to follow within the bounds.
         converged: bool,
         /// Number of evaluations of the score.
@@ -173,7 +173,7 @@ answer! {
         /// The score over ascending alpha, with everything else as selected.
         ///
         /// Empty with `noise_variances`, and for more than 3,000 points.
-        path: Vec<PathEntry>,
+        alpha_path: Vec<PathEntry>,
         /// Predictions of each value from all others, in closed form.
         leave_one_out: LeftOut,
         /// Diagnostics of the fit that the search began with.

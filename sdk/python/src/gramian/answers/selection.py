@@ -32,7 +32,7 @@ class AlphaPath(Answer):
     @classmethod
     def read(cls, members: Members, **derived: object) -> Self:
         """Reads a list of objects as one array for each of their members."""
-        columns = {f"{name}s": [entry.get(name) for entry in members["path"]] for name in ("alpha", "score")}
+        columns = {f"{name}s": [entry.get(name) for entry in members["alpha_path"]] for name in ("alpha", "score")}
         return super().read(Members({}, columns, members.request), **derived)
 
 
@@ -72,7 +72,7 @@ class ModelSelection(Answer):
         if the mean is zero.
     score
         The criterion for the selected kernel and noise. Greater is better.
-    gradient
+    score_gradient
         Derivatives of the score by the logarithm of each free parameter, in the order of `vary`. For
         `length_scales` without an axis, by the logarithm of a common factor. NaN for `nu`, which is discrete.
     converged
@@ -81,8 +81,8 @@ class ModelSelection(Answer):
         Number of evaluations of the criterion.
     families
         The families tried, with their best scores. Each `nu` of `matern` counts as a family.
-    path
-        The criterion over alpha: `path.alphas` and `path.scores`.
+    alpha_path
+        The criterion over alpha: `alpha_path.alphas` and `alpha_path.scores`.
     leave_one_out
         Each value predicted from all others: `means`, `variances` and `log_predictive_densities`.
     diagnostics
@@ -95,11 +95,11 @@ class ModelSelection(Answer):
     alpha: float | None = None
     mean_coefficients: Array | None = None
     score: float
-    gradient: Array
+    score_gradient: Array
     converged: bool
     evaluations: int
     families: tuple[FamilyScore, ...]
-    path: AlphaPath
+    alpha_path: AlphaPath
     leave_one_out: LeaveOneOut
     diagnostics: Diagnostics
     fit: ValuesFit
@@ -108,7 +108,7 @@ class ModelSelection(Answer):
     def read(cls, members: Members, **derived: object) -> Self:
         """Reads the answer of `/v1/model-selection`."""
         left_out = Members({}, members["leave_one_out"], members.request)
-        parts = {"path": AlphaPath.read(members), "leave_one_out": LeaveOneOut.read(left_out)}
+        parts = {"alpha_path": AlphaPath.read(members), "leave_one_out": LeaveOneOut.read(left_out)}
         return super().read(members, fit=selected_fit(members), **parts, **derived)
 
     def plot(self, ax: Any = None) -> Any:  # noqa: ANN401 (Axes, LikelihoodDisplay)

@@ -92,7 +92,7 @@ class LikelihoodDisplay:
     @classmethod
     def from_answer(cls, answer: Any) -> Self:  # noqa: ANN401 (ModelSelection)
         """Takes the path of a model selection."""
-        return cls(answer.path.alphas, answer.path.scores, selected=answer.alpha)
+        return cls(answer.alpha_path.alphas, answer.alpha_path.scores, selected=answer.alpha)
 
     def plot(self, ax: Any = None) -> Self:  # noqa: ANN401 (Axes)
         """Draws the criterion over α on a logarithmic axis."""

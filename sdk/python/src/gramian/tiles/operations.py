@@ -24,7 +24,7 @@ REGIONS: Mapping[str, Rule] = {
 def choose_coarse(client: Client, points: Array, **options: float) -> tuple[Integers, Fit]:
     """Chooses points that are spread as the cloud is, with kernel and alpha of their signature function."""
     connection = client._connection
-    response = connection.post("/v1/coarse", {"points": points, **options}, JSON)
+    response = connection.post("/v1/tiles/coarse", {"points": points, **options}, JSON)
     found = connection.read(CoarseResponse.from_dict, response)
     fit = Fit(solver="dense", kernel=found.kernel, alpha=found.alpha)
     return np.array(found.points, dtype=np.int64), fit
@@ -40,7 +40,7 @@ def find_regions(
         return np.asarray(members["labels"], dtype=np.int64), regions
 
     return cloud._compute(
-        read, "/v1/regions", REGIONS, solver="local", own=own, coarse=coarse, hyperparameters=hyperparameters
+        read, "/v1/tiles/regions", REGIONS, solver="local", own=own, coarse=coarse, hyperparameters=hyperparameters
     )
 
 
@@ -48,6 +48,6 @@ def choose_sides(client: Client, tiles: list[dict[str, Any]], links: Integers) -
     """Chooses the sides of the regions of all tiles: signs, `[r]`, and whether they are doubtful, `[r]`."""
     connection = client._connection
     pairs = [{"first": first, "second": second} for first, second in links.tolist()]
-    response = connection.post("/v1/sides", {"tiles": tiles, "links": pairs}, JSON)
+    response = connection.post("/v1/tiles/sides", {"tiles": tiles, "links": pairs}, JSON)
     found = connection.read(SidesResponse.from_dict, response)
     return np.array(found.signs, dtype=np.float64), np.array(found.are_doubtful, dtype=bool)

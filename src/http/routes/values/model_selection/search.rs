@@ -318,9 +318,9 @@ impl Work {
         };
         let selected = select(&selection, observer).map_err(refused)?;
         let left_out = leave_one_out_with(selection.observations, &selected.hyperparameters, observer);
-        let path = path(&selection, &selected.hyperparameters, observer).map_err(refused)?;
+        let alpha_path = path_over_alpha(&selection, &selected.hyperparameters, observer).map_err(refused)?;
         let n_given = search.vary.as_ref().map_or(variations.len(), Vec::len);
-        let gradient = gradient(&selected, &variations, n_given);
+        let score_gradient = score_gradient(&selected, &variations, n_given);
         let kernel = selected.hyperparameters.kernel_on(cloud).map_err(refused)?;
         let noise = &selected.hyperparameters.noise;
         Ok(ModelSelectionResponse {
@@ -334,11 +334,11 @@ impl Work {
                 Array::new(coefficients, &[p])
             }),
             score: selected.score,
-            gradient,
+            score_gradient,
             converged: selected.converged,
             evaluations: selected.evaluations,
             families: family_scores(&selected),
-            path,
+            alpha_path,
             leave_one_out: rows.left_out(left_out.map_err(refused)?).into(),
             diagnostics,
         })
@@ -346,7 +346,7 @@ impl Work {
 }
 
 /// Returns the slopes of the selection for each of `n_given` entries of `vary`. Null for `nu`.
-fn gradient(selected: &Selected, variations: &[(usize, Variation)], n_given: usize) -> Vec<Nullable> {
+fn score_gradient(selected: &Selected, variations: &[(usize, Variation)], n_given: usize) -> Vec<Nullable> {
     let n_axes = selected.hyperparameters.length_scales.len();
     let mut gradient = vec![Nullable(None); n_given];
     let mut slopes = selected.gradient.iter();
@@ -375,7 +375,7 @@ fn scaled(
 /// Computes the score over α at the selection.
 ///
 /// The path is empty with noise per point, and for more than [`MAX_PATH_POINTS`] points.
-fn path(
+fn path_over_alpha(
     selection: &Selection<'_>,
     at: &Hyperparameters,
     observer: &JobObserver,
