@@ -1,5 +1,7 @@
 //! Warnings of a poor fit: values that contradict kernel and noise.
 
+use std::f64::consts::TAU;
+
 use serde_json::{Value, json};
 
 use crate::common::random::Random;
@@ -92,6 +94,32 @@ async fn a_given_kernel_is_told_where_deviations_are_asked_for() {
     let lists = with(&fitting, json!({"values": [right, wrong]}));
     let answer = server.post("/v1/posterior/batch", &lists).await.expect_ok();
     assert_eq!(poor_fits(&answer).len(), 1);
+}
+
+#[tokio::test]
+async fn detail_that_is_taken_for_noise_is_named_whichever_solver_answers() {
+    // A series of even spacing: a long wave, and a ripple of a tenth of it with 3.7 points a wave. The ripple
+    // alone differs from noise by its correlation, which is least between neighbours and greatest between
+    // the next but one.
+    let server = Server::start().await;
+    let points: Vec<[f64; 1]> = (0..500).map(|i| [0.002 * f64::from(i)]).collect();
+    let series = |ripple: f64, noise: f64| {
+        let mut random = Random(4);
+        let long = |x: f64| (6.0 * x).sin() + ripple * (TAU * x / 0.0074).sin();
+        let values: Vec<f64> = points.iter().map(|x| long(x[0]) + noise * random.normal()).collect();
+        json!({"cloud": {"points": points}, "values": values, "queries": [[0.5]]})
+    };
+    for solver in ["dense", "local"] {
+        for route in ["/v1/posterior", "/v1/interpolation"] {
+            let with_solver = |body: Value| with(&body, json!({"solver": solver}));
+            let answer = server.post(route, &with_solver(series(0.1, 0.01))).await.expect_ok();
+            let found = poor_fits(&answer);
+            assert_eq!(found.len(), 1, "{route}, {solver}: {answer}");
+            assert!(found[0].starts_with("residuals of near points are correlated"), "{}", found[0]);
+            let answer = server.post(route, &with_solver(series(0.0, 0.07))).await.expect_ok();
+            assert_eq!(poor_fits(&answer), Vec::<String>::new(), "{route}, {solver}");
+        }
+    }
 }
 
 #[tokio::test]

@@ -164,8 +164,7 @@ fn chosen(by: By, cloud: &Cloud, values: &[f64]) -> Chosen {
     let learned = learn(Observed { cloud, sampling: &sampling, values, noise, mean }, &Unobserved).unwrap();
     let By::Criterion(criterion) = by else {
         let kernel = learned.kernel(1.0).unwrap();
-        let is_near = |found: &Disagreement| found.place.is_some() || found.autocorrelation.is_some();
-        let is_contradicted = learned.disagreement.as_ref().is_some_and(is_near);
+        let is_contradicted = learned.disagreement.as_ref().is_some_and(Disagreement::is_of_near_values);
         let Learned { ratio, variance, copies, .. } = learned;
         return Chosen { kernel, ratio, variance, is_contradicted, copies };
     };

@@ -249,8 +249,8 @@ impl Diagnostics {
                  of them in root mean square, and all are {spread:.1}; {remedy}"
             ),
             (None, None, Some(Autocorrelation { coefficient, n_pairs })) => format!(
-                "values of nearest points are off in the same direction (correlation {coefficient:.2} over {n_pairs} pairs): detail finer than \
-                 the length scale is taken for noise, and deviations of the function leave it out; add points where detail matters, or use a \
+                "residuals of near points are correlated ({coefficient:.2} over {n_pairs} pairs), as those of noise are not: detail finer than the \
+                 length scale is taken for noise, and deviations of the function leave it out; add points where detail matters, or use a \
                  kernel with a shorter length scale"
             ),
             (None, None, None) => format!(

@@ -136,10 +136,10 @@ impl FitPlan {
 
     /// Returns the contradiction between the values and kernel and noise that was found while learning.
     ///
-    /// A solver that sees all values at once reports the rest itself.
+    /// A solver that sees all values at once reports what single values and all together say.
     pub fn disagreement(&self) -> Option<Disagreement> {
         let found = self.process.learned.as_ref()?.disagreement?;
-        (self.learned_of_local().is_some() || found.place.is_some()).then_some(found)
+        (self.learned_of_local().is_some() || found.is_of_near_values()).then_some(found)
     }
 
     /// Returns whether the values are so small that a greater variance than theirs is assumed.

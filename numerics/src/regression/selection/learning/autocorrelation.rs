@@ -1,6 +1,6 @@
-//! Correlation of what kernel and noise leave unexplained, between nearest neighbours.
+//! Correlation of what kernel and noise leave unexplained, between near points.
 //!
-//! A fine ripple between a few points a wave is more likely noise than a reason for a short length scale, if
+//! A fine ripple with a few points a wave is more likely noise than a reason for a short length scale, if
 //! another feature of the values is long. Noise is independent from point to point, a ripple is not.
 
 use std::collections::HashMap;
@@ -12,47 +12,75 @@ use crate::regression::solver::Autocorrelation;
 /// normal numbers have longer tails than normal numbers, so this is more than it would be for a sum of these.
 const SIGNIFICANT: f64 = 4.0;
 
-/// Pairs of nearest neighbours among some points.
-pub(super) struct Pairs {
-    /// Pairs of rows, the smaller one first, each once.
-    rows: Vec<[usize; 2]>,
-}
+/// Number of rings of neighbours. On a line of even spacing they are one, two and three spacings away. At
+/// some of these distances a ripple of two points a wave and more has equal or opposite values.
+const RINGS: usize = 3;
 
-impl Pairs {
-    /// Pairs each of these points with its nearest neighbour, where that is one of them too. `points` are the
-    /// first points at their positions, by row.
+/// Least mean square of residuals, in deviations, whose correlation counts. Where a kernel is rougher than
+/// most of the values, so that it suits one place, residuals are correlated, but deviations are long enough.
+const LEAST_MEAN_SQUARE: f64 = 0.7;
+
+/// Pairs of rows at some distance from each other, the smaller one first, each once.
+type Pairs = Vec<[usize; 2]>;
+
+/// Pairs of near points among some.
+pub(super) struct Rings([Pairs; RINGS]);
+
+impl Rings {
+    /// Pairs each of these points with its neighbours of the ranks 1, 2d + 1 and 4d + 1, where they are among
+    /// them too. `points` are the first points at their positions, by row.
     pub(super) fn of(observed: &Observed<'_>, points: &[usize]) -> Self {
         let row_of: HashMap<usize, usize> =
             points.iter().enumerate().map(|(row, &point)| (point, row)).collect();
-        let nearest = |(row, &point): (usize, &usize)| {
-            let near = observed.sampling.neighbours().nearest_positions(observed.cloud.point(point), 2);
-            let other = near.into_iter().map(|neighbour| neighbour.point).find(|&other| other != point)?;
-            row_of.get(&other).map(|&other| [row.min(other), row.max(other)])
-        };
-        let mut rows: Vec<[usize; 2]> = points.iter().enumerate().filter_map(nearest).collect();
-        rows.sort_unstable();
-        rows.dedup();
-        Self { rows }
+        let width = 2 * observed.cloud.dimension();
+        let mut rings: [Pairs; RINGS] = Default::default();
+        for (row, &point) in points.iter().enumerate() {
+            let count = (RINGS - 1) * width + 2;
+            let near = observed.sampling.neighbours().nearest_positions(observed.cloud.point(point), count);
+            // The first one is the point itself.
+            for (pairs, neighbour) in rings.iter_mut().zip(near.iter().skip(1).step_by(width)) {
+                let other = row_of.get(&neighbour.point).filter(|&&other| other != row);
+                pairs.extend(other.map(|&other| [row.min(other), row.max(other)]));
+            }
+        }
+        for pairs in &mut rings {
+            pairs.sort_unstable();
+            pairs.dedup();
+        }
+        Self(rings)
     }
 
-    /// Returns the autocorrelation of whitened values `[k, n]`, if it is positive and beyond chance.
+    /// Returns the autocorrelation of whitened values `[k, n]` that is farthest beyond chance, if one is.
     ///
-    /// The coefficient is `Σ z_i z_j / Σ ½(z_i² + z_j²)` over the pairs: that of Moran (1950, Biometrika 37)
-    /// with weight 1 for nearest neighbours. Of m pairs of independent values, its deviation is `1/√m`. More
-    /// lists are no more pairs, since what they have in common is not known.
-    pub(super) fn autocorrelation(&self, whitened: &[f64], n: usize) -> Option<Autocorrelation> {
-        let of_list = |list: &[f64]| {
-            let of_pair =
-                |&[i, j]: &[usize; 2]| (list[i] * list[j], 0.5 * (list[i].powi(2) + list[j].powi(2)));
-            self.rows.iter().map(of_pair).fold((0.0, 0.0), |(a, b), (c, d)| (a + c, b + d))
+    /// `mean_square` is that of the values in deviations. Of m pairs of independent values, the deviation of
+    /// a coefficient is `1/√m`. More lists are no more pairs, since what they have in common is not known.
+    pub(super) fn autocorrelation(
+        &self,
+        whitened: &[f64],
+        n: usize,
+        mean_square: f64,
+    ) -> Option<Autocorrelation> {
+        let of_ring = |pairs: &Pairs| {
+            let coefficient = coefficient(pairs, whitened, n);
+            Autocorrelation { coefficient, n_pairs: pairs.len() }
         };
-        let (products, squares) =
-            whitened.chunks_exact(n).map(of_list).fold((0.0, 0.0), |(a, b), (c, d)| (a + c, b + d));
-        let n_pairs = self.rows.len();
-        let coefficient = products / squares;
-        (coefficient * (n_pairs as f64).sqrt() > SIGNIFICANT)
-            .then_some(Autocorrelation { coefficient, n_pairs })
+        let significance = |of: &Autocorrelation| of.coefficient.abs() * (of.n_pairs as f64).sqrt();
+        let counts = mean_square >= LEAST_MEAN_SQUARE;
+        let found = self.0.iter().map(of_ring).filter(|of| counts && significance(of) > SIGNIFICANT);
+        found.max_by(|a, b| significance(a).total_cmp(&significance(b)))
     }
+}
+
+/// Returns `Σ z_i z_j / Σ ½(z_i² + z_j²)` over pairs of rows: the coefficient of Moran (1950, Biometrika 37)
+/// with weight 1 for each pair. NaN if all are 0.
+fn coefficient(pairs: &Pairs, whitened: &[f64], n: usize) -> f64 {
+    let of_list = |list: &[f64]| {
+        let of_pair = |&[i, j]: &[usize; 2]| (list[i] * list[j], 0.5 * (list[i].powi(2) + list[j].powi(2)));
+        pairs.iter().map(of_pair).fold((0.0, 0.0), |(a, b), (c, d)| (a + c, b + d))
+    };
+    let (products, squares) =
+        whitened.chunks_exact(n).map(of_list).fold((0.0, 0.0), |(a, b), (c, d)| (a + c, b + d));
+    products / squares
 }
 
 #[cfg(test)]
@@ -77,7 +105,7 @@ mod tests {
         let (values, noise, mean) = (&list[..], Noise::Unknown, Mean::Zero);
         let observed = Observed { cloud: &cloud, sampling: &sampling, values, noise, mean };
         let points: Vec<usize> = (0..N).collect();
-        Pairs::of(&observed, &points).autocorrelation(&list.repeat(n_lists), N)
+        Rings::of(&observed, &points).autocorrelation(&list.repeat(n_lists), N, 1.0)
     }
 
     #[test]

@@ -4,7 +4,7 @@ use faer::Mat;
 use rayon::prelude::*;
 
 use super::Learned;
-use super::autocorrelation::Pairs;
+use super::autocorrelation::Rings;
 use super::group::{Group, Nugget, Whitened};
 use super::order::{Conditional, PLACE};
 use super::replicates::Scatter;
@@ -220,7 +220,8 @@ impl<'a> Evidence<'a> {
             rest.iter().map(|z| z.abs()).enumerate().max_by(|(_, a), (_, b)| a.total_cmp(b))?;
         let outlier = Outlier { point: self.points[at % n], deviations: largest * in_deviations };
         let place = self.place(rest, in_deviations);
-        let autocorrelation = Pairs::of(&self.values.observed, &self.points).autocorrelation(rest, n);
+        let rings = Rings::of(&self.values.observed, &self.points);
+        let autocorrelation = rings.autocorrelation(rest, n, mean_square);
         Disagreement { outlier: Some(outlier), place, autocorrelation, mean_square }.if_any(n_degrees)
     }
 

@@ -88,9 +88,9 @@ pub struct Place {
 /// Correlation of near values, without what kernel and noise explain of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Autocorrelation {
-    /// 0 for independent values, 1 for equal ones.
+    /// 0 for independent values, 1 for equal ones, −1 for opposite ones.
     pub coefficient: f64,
-    /// Number of pairs of nearest neighbours.
+    /// Number of pairs of neighbours.
     pub n_pairs: usize,
 }
 
@@ -101,7 +101,7 @@ pub struct Disagreement {
     pub outlier: Option<Outlier>,
     /// The place that is farthest off, if places were examined and one is off.
     pub place: Option<Place>,
-    /// Correlation of nearest neighbours, if they were examined and are correlated. Detail is then taken for
+    /// Correlation of near neighbours, if they were examined and are correlated. Detail is then taken for
     /// noise.
     pub autocorrelation: Option<Autocorrelation>,
     /// Mean square of standardised residuals: each value without what those before it predict, in units of
@@ -110,13 +110,18 @@ pub struct Disagreement {
 }
 
 impl Disagreement {
+    /// Returns whether near values contradict kernel and noise together, which only a comparison of near
+    /// values finds.
+    pub fn is_of_near_values(&self) -> bool {
+        self.place.is_some() || self.autocorrelation.is_some()
+    }
+
     /// Returns the disagreement of values with this many degrees of freedom, or `None` if there is no
     /// contradiction. Its outlier is kept only if it is more than six deviations off.
     pub(crate) fn if_any(self, n_degrees: usize) -> Option<Self> {
         let outlier = self.outlier.filter(|outlier| outlier.deviations > OUTLYING);
         let most = MEAN_SQUARE + 5.0 * (2.0 / n_degrees as f64).sqrt();
-        let is_local = self.place.is_some() || self.autocorrelation.is_some();
-        let is_any = outlier.is_some() || is_local || self.mean_square > most;
+        let is_any = outlier.is_some() || self.is_of_near_values() || self.mean_square > most;
         is_any.then_some(Self { outlier, ..self })
     }
 }
