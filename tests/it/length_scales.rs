@@ -142,7 +142,7 @@ async fn selection_finds_the_axes_that_do_not_matter() {
     let all = server.post("/v1/model-selection", &body).await.expect_ok();
     let found = numbers(&all["kernel"]["length_scales"]);
     assert!(found[0] < 1.0 && found[2] > 5.0, "{found:?}");
-    assert_eq!(all["gradient"].as_array().unwrap().len(), 3);
+    assert_eq!(all["score_gradient"].as_array().unwrap().len(), 3);
     // The selected kernel is accepted by other routes, and its likelihood is the score.
     let mut posterior = body.clone();
     posterior.as_object_mut().unwrap().remove("vary");
@@ -163,13 +163,13 @@ async fn selection_finds_the_axes_that_do_not_matter() {
     ]);
     let each = server.post("/v1/model-selection", &body).await.expect_ok();
     assert!((each["score"].as_f64().unwrap() - score).abs() < 1e-6 * score.abs());
-    assert_eq!(each["gradient"].as_array().unwrap().len(), 5);
+    assert_eq!(each["score_gradient"].as_array().unwrap().len(), 5);
     // Without `vary`, the parameters of the starting kernel are searched.
     body.as_object_mut().unwrap().remove("vary");
     body["kernel"] = all["kernel"].clone();
     let on = server.post("/v1/model-selection", &body).await.expect_ok();
     assert!(on["score"].as_f64().unwrap() >= score - 1e-6 * score.abs());
-    assert_eq!(on["gradient"].as_array().unwrap().len(), 5);
+    assert_eq!(on["score_gradient"].as_array().unwrap().len(), 5);
     for (entry, pointer) in [
         (json!({"parameter": "variance", "axis": 0, "min": 1, "max": 2}), "/vary/0/axis"),
         (json!({"parameter": "length_scales", "axis": 3, "min": 1, "max": 2}), "/vary/0/axis"),
