@@ -136,7 +136,7 @@ impl FitPlan {
 
     /// Returns the contradiction between the values and kernel and noise that was found while learning.
     ///
-    /// A solver that sees all values at once reports what single values and all together say.
+    /// A solver of all values reports outliers and the mean square itself, so only near values count for it.
     pub fn disagreement(&self) -> Option<Disagreement> {
         let found = self.process.learned.as_ref()?.disagreement?;
         (self.learned_of_local().is_some() || found.is_of_near_values()).then_some(found)

@@ -110,8 +110,8 @@ pub struct Disagreement {
 }
 
 impl Disagreement {
-    /// Returns whether near values contradict kernel and noise together, which only a comparison of near
-    /// values finds.
+    /// Returns whether values contradict kernel and noise together with those near them: at a place, or by
+    /// their correlation.
     pub fn is_of_near_values(&self) -> bool {
         self.place.is_some() || self.autocorrelation.is_some()
     }
