@@ -282,7 +282,7 @@ def test_a_selection_finds_what_explains_values(client: gramian.Client) -> None:
     assert found.alpha is not None
     assert np.sqrt(found.alpha) == pytest.approx(0.1, rel=0.3)
     assert found.mean_coefficients is None
-    assert_shapes(found, gradient=(3,))
+    assert_shapes(found, score_gradient=(3,))
     assert_shapes(found.alpha_path, alphas=found.alpha_path.scores.shape)
     assert_shapes(found.leave_one_out, means=(70,), variances=(70,), log_predictive_densities=(70,))
     assert np.all(np.diff(found.alpha_path.alphas) > 0)
