@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use serde_json::{Value, json};
 
 use crate::common::random::Random;
-use crate::support::{Server, fibonacci_sphere, numbers};
+use crate::support::{Server, fibonacci_sphere, numbers, warnings_of};
 
 /// Returns a request with x₃ on the unit sphere, noise of 1 %, and one value off by `shift`.
 fn measured(n: usize, shift: f64) -> Value {
@@ -22,11 +22,8 @@ fn with(body: &Value, more: Value) -> Value {
     body
 }
 
-/// Returns the details of these warnings.
 fn poor_fits(answer: &Value) -> Vec<String> {
-    let warnings = answer["diagnostics"]["warnings"].as_array().unwrap();
-    let of_poor_fit = warnings.iter().filter(|warning| warning["code"] == "poor_fit");
-    of_poor_fit.map(|warning| warning["detail"].as_str().unwrap().to_owned()).collect()
+    warnings_of(answer, "poor_fit")
 }
 
 #[tokio::test]

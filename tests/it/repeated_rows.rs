@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::common::random::Random;
-use crate::support::{Server, fibonacci_sphere, numbers};
+use crate::support::{Server, fibonacci_sphere, numbers, warnings_of};
 
 /// Returns a request with x₃ on the unit sphere and noise of a tenth. The first `n_copies` rows are sent
 /// twice.
@@ -15,11 +15,8 @@ fn measured(n: usize, n_copies: usize) -> Value {
     json!({"cloud": {"points": points}, "values": values, "queries": [[1.0, 0.0, 0.0], [0.0, 0.6, 0.8]]})
 }
 
-/// Returns the details of the warnings of repeated rows.
 fn repeated(answer: &Value) -> Vec<String> {
-    let warnings = answer["diagnostics"]["warnings"].as_array().unwrap();
-    let of_rows = warnings.iter().filter(|warning| warning["code"] == "repeated_rows");
-    of_rows.map(|warning| warning["detail"].as_str().unwrap().to_owned()).collect()
+    warnings_of(answer, "repeated_rows")
 }
 
 #[tokio::test]

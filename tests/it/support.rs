@@ -167,6 +167,13 @@ pub fn fibonacci_sphere(n: usize) -> Vec<[f64; 3]> {
     clouds::rows(&clouds::fibonacci_sphere(n))
 }
 
+/// Returns the details of the warnings of an answer that have a code.
+pub fn warnings_of(answer: &Value, code: &str) -> Vec<String> {
+    let warnings = answer["diagnostics"]["warnings"].as_array().unwrap();
+    let of_code = warnings.iter().filter(|warning| warning["code"] == code);
+    of_code.map(|warning| warning["detail"].as_str().unwrap().to_owned()).collect()
+}
+
 /// Returns all numbers of nested arrays, in order. Skips nulls.
 pub fn numbers(value: &Value) -> Vec<f64> {
     match value {

@@ -1,4 +1,4 @@
-//! `POST /v1/tiles/coarse`: the part of a cloud that says which side of its surface is outward.
+//! `POST /v1/tiles/coarse`: the part of a cloud by which the outward side of its surface is decided.
 
 use std::sync::Arc;
 

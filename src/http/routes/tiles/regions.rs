@@ -1,4 +1,4 @@
-//! `POST /v1/tiles/regions`: what a tile knows of the sides of its surface.
+//! `POST /v1/tiles/regions`: the regions of a tile, and sums by which the side of each is decided.
 
 use std::sync::Arc;
 
