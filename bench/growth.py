@@ -85,8 +85,8 @@ def measure(binary, n):
         seen = {**known, "values": values, "queries": points[:1]}
         found["solve"] = ask(address, "/v1/interpolation", seen)[2]["solve"]
         found["warm"] = min(ask(address, "/v1/interpolation", seen)[1] for _ in range(N_WARM))
-        variance = {**known, "values": values, "queries": points[:100], "include": ["variance"]}
-        found["variance"] = ask(address, "/v1/posterior", variance)[1]
+        variance = {**known, "values": values, "queries": points[:100], "include": ["variances"]}
+        found["variances"] = ask(address, "/v1/posterior", variance)[1]
     return found
 
 

@@ -67,7 +67,7 @@ const EXTRAS = ["arrows", "directions", "section", "sectionAt"];
 /** Settings that change the request. All others change the picture alone. */
 const ASKED = [
   "operation",
-  "deviations",
+  "std",
   "quality",
   "open",
   "step",

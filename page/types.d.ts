@@ -29,7 +29,7 @@ export interface Answer {
 
 /** Members of an answer that are no tensors. */
 export interface Fields {
-  degenerate?: { query: number; reason: string }[];
+  flags?: { query: number; reason: string }[];
   parts?: { euler_characteristic: number; n_boundary_edges: number }[];
   /** What each vertex of a mesh rests on. */
   support?: string[];

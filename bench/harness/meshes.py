@@ -83,7 +83,7 @@ def row(name: str, vertices: Floats, faces: NDArray[np.int64]) -> str:
     points, expected, is_known = Known.of(vertices, faces)
     answer = ask({"cloud": {"points": points.tolist()}, "solver": "local"})
     normals = np.array([normal or [0.0] * 3 for normal in answer["normals"]])
-    flags = {entry["query"]: entry["reason"] for entry in answer["degenerate"]}
+    flags = {entry["query"]: entry["reason"] for entry in answer["flags"]}
     is_flagged = np.isin(np.arange(len(points)), list(flags)) & is_known
     is_ambiguous = np.array([flags.get(point) == "ambiguous_side" for point in range(len(points))])
     cosines = np.einsum("ij,ij->i", normals, expected)
@@ -103,9 +103,9 @@ def noisy_row(name: str, known: Known, noise: float) -> str:
     tree = cKDTree(known.points)
     spacing = np.median(tree.query(known.points, 2)[0][:, 1])
     moved = known.points + noise * spacing * np.random.default_rng(3).normal(size=known.points.shape)
-    answer = ask({"cloud": {"points": moved.tolist()}, "solver": "local", "include": ["deviations"]})
+    answer = ask({"cloud": {"points": moved.tolist()}, "solver": "local", "include": ["std"]})
     found = np.array([normal or [0.0] * 3 for normal in answer["normals"]])
-    bars = np.array([bar or 0.0 for bar in answer["normal_deviations"]])
+    bars = np.array([bar or 0.0 for bar in answer["normal_std"]])
     off = angles(found, known)
     best = min(np.median(angles(planes(moved, count), known)) for count in NEIGHBOURS)
     covered = (off <= BAND * bars[known.is_known]).mean()

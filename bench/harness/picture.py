@@ -50,9 +50,9 @@ def main() -> None:
     use_cores(N_THREADS)
     setting = Setting(ROOT, is_quick=False, with_gpytorch=False)
     points = Dragon(setting.build / "scale").scan(arguments.level).points
-    asked = {"include": ["deviations"]}
+    asked = {"include": ["std"]}
     answer = Service(setting, arguments.binary, {}).ask("/v1/curvatures", points, asked, n_rounds=arguments.rounds)
-    curvatures, deviations = (answer.member(name) / MILLIMETRES for name in ("mean_curvatures", "mean_curvature_deviations"))
+    curvatures, deviations = (answer.member(name) / MILLIMETRES for name in ("mean_curvatures", "mean_curvature_std"))
     PICTURE.write_bytes(picture(points, answer.member("normals"), curvatures, deviations))
     low, middle, high = np.nanquantile(deviations, [0.05, 0.5, 0.95])
     print(f"{len(points):,} points in {answer.seconds:.1f} s; {np.isnan(curvatures).sum()} without curvatures")

@@ -1,4 +1,4 @@
-//! Prints the table of docs/degeneracy.md, Orientation: normals on the wrong side, with a flag and without.
+//! Prints the table of docs/flags.md, Orientation: normals on the wrong side, with a flag and without.
 //!
 //! `cargo run --release --example sides_sweep [largest number of points]`, 3,000 by default.
 

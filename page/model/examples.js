@@ -171,7 +171,7 @@ async function dragon() {
   for (const axis of [0, 1, 2]) {
     for (const [row, x] of column(axis).entries()) data[3 * row + axis] = x;
   }
-  const found = { mean_curvatures: column(3), mean_curvature_deviations: column(4) };
+  const found = { mean_curvatures: column(3), mean_curvature_std: column(4) };
   const normals = new Float64Array(3 * n);
   const [polar, azimuth] = [column(5), column(6)];
   for (let row = 0; row < n; row++) {

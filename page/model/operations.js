@@ -21,7 +21,7 @@ export function requestOf(settings) {
   /** @type {Record<string, any>} */
   const request = {};
   const include = [];
-  if (settings.deviations) include.push("deviations");
+  if (settings.deviations) include.push("std");
   if (settings.operation === "mesh") {
     include.unshift("curvatures");
     if (settings.quality !== "regular") request.quality = settings.quality;
@@ -49,11 +49,11 @@ const NAMES = {
   gradient_norms: "gradient of u",
   levels: "level of u",
   residuals: "distance from the level",
-  position_deviations: "deviation of the position",
-  normal_deviations: "deviation of the normal",
-  principal_curvature_deviations: "deviation of a principal curvature",
-  mean_curvature_deviations: "deviation of the mean curvature",
-  gaussian_curvature_deviations: "deviation of the Gaussian curvature",
+  position_std: "deviation of the position",
+  normal_std: "deviation of the normal",
+  principal_curvature_std: "deviation of a principal curvature",
+  mean_curvature_std: "deviation of the mean curvature",
+  gaussian_curvature_std: "deviation of the Gaussian curvature",
 };
 
 /** Vectors, which are drawn and not coloured by, and what is no quantity of a point. */
@@ -82,7 +82,7 @@ export function quantitiesOf(answer, cloud) {
         unit: unitOf(name, cloud.points.width),
         isSigned: /curvatures$/.test(name),
         values: columnOf(tensor, at),
-        deviations: columnOf(answer.tensors[`${name.replace(/s$/, "")}_deviations`], at),
+        deviations: columnOf(answer.tensors[`${name.replace(/s$/, "")}_std`], at),
       });
     }
   }
@@ -105,8 +105,8 @@ function columnOf(tensor, at) {
 function unitOf(name, d) {
   if (name.startsWith("gaussian")) return d === 2 ? "1/L" : "1/L²";
   if (name.includes("curvature")) return "1/L";
-  if (name === "normal_deviations") return "rad";
-  if (/^(residuals|position_deviations)$/.test(name)) return "L";
+  if (name === "normal_std") return "rad";
+  if (/^(residuals|position_std)$/.test(name)) return "L";
   return "";
 }
 

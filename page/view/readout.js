@@ -52,7 +52,7 @@ export function element(name, properties = {}, ...children) {
  */
 export function markedOf(answer) {
   const reasons = new Map();
-  for (const { query, reason } of answer.fields.degenerate ?? []) {
+  for (const { query, reason } of answer.fields.flags ?? []) {
     const marks = reasons.get(reason) ?? { points: [], colour: MARKS[reasons.size % MARKS.length] };
     marks.points.push(query);
     reasons.set(reason, marks);

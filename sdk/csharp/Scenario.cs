@@ -62,7 +62,7 @@ public static class Scenario
         var request = new CurvaturesRequest(Registered, Gauss(2), Alpha, queries: queries);
         var answer = Geometry.ComputeCurvatures(request);
         Check(Math.Abs(answer.MeanCurvatures[0].Value - 1) < 1e-6, answer);
-        Check(answer.MeanCurvatures[1] == null && answer.Degenerate[0].Query == 1, answer);
+        Check(answer.MeanCurvatures[1] == null && answer.Flags[0].Query == 1, answer);
     }
 
     private static void TheMatrixTurnsCosinesIntoTheirNegatives()

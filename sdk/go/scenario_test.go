@@ -84,7 +84,7 @@ func curvaturesAreNullAtTheCentre(t *testing.T, client *gramian.APIClient) {
 	if onTheCircle == nil || math.Abs(*onTheCircle-1) > 1e-6 {
 		t.Errorf("the circle should have the curvature 1: %v", answer.MeanCurvatures)
 	}
-	if atTheCentre != nil || answer.Degenerate[0].Query != 1 {
+	if atTheCentre != nil || answer.Flags[0].Query != 1 {
 		t.Errorf("the centre should have no curvature, but has %v", atTheCentre)
 	}
 }

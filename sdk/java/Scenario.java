@@ -67,7 +67,7 @@ public class Scenario {
         var answer = geometry.computeCurvatures(request.kernel(gauss(2.0)).alpha(0.0));
         List<Double> curvatures = answer.getMeanCurvatures();
         check(Math.abs(curvatures.get(0) - 1) < 1e-6, curvatures);
-        check(curvatures.get(1) == null && answer.getDegenerate().get(0).getQuery() == 1, answer);
+        check(curvatures.get(1) == null && answer.getFlags().get(0).getQuery() == 1, answer);
     }
 
     private void theMatrixTurnsCosinesIntoTheirNegatives() throws ApiException {

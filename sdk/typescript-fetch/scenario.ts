@@ -66,11 +66,11 @@ async function curvaturesAreNullAtTheCentre() {
         kernel: gauss,
         alpha: 0,
     };
-    const { meanCurvatures, degenerate } = await geometry.computeCurvatures({ curvaturesRequest });
+    const { meanCurvatures, flags } = await geometry.computeCurvatures({ curvaturesRequest });
     const [onTheCircle, atTheCentre] = meanCurvatures;
     assert.ok(Math.abs((onTheCircle ?? NaN) - 1) < 1e-6, `${onTheCircle}`);
     assert.equal(atTheCentre, null);
-    assert.equal(degenerate[0]?.query, 1);
+    assert.equal(flags[0]?.query, 1);
 }
 
 async function theMatrixTurnsCosinesIntoTheirNegatives() {

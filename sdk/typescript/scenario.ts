@@ -46,7 +46,7 @@ async function curvaturesAreNullAtTheCentre() {
     const [onTheCircle, atTheCentre] = data.mean_curvatures;
     assert.ok(Math.abs((onTheCircle ?? NaN) - 1) < 1e-6, `${onTheCircle}`);
     assert.equal(atTheCentre, null);
-    assert.equal(data.degenerate[0]?.query, 1);
+    assert.equal(data.flags[0]?.query, 1);
 }
 
 async function theMatrixTurnsCosinesIntoTheirNegatives() {

@@ -125,8 +125,8 @@ async fn of_cloud(operation: &str, of: &OfCloud, config: Config) -> Result<(), F
     if of.deviations {
         let include = request.entry("include").or_insert(json!([])).as_array_mut();
         let include = include.ok_or_else(|| Failure::Argument("--with: include is not a list".to_owned()))?;
-        if !include.contains(&json!("deviations")) {
-            include.push(json!("deviations"));
+        if !include.contains(&json!("std")) {
+            include.push(json!("std"));
         }
     }
     let output = Output::prepare(Some(&of.output), &of.cloud)?;

@@ -13,6 +13,7 @@ use gramian_host::memory::{CacheOutcome, Owner};
 use gramian_numerics::machine::heap::{arc_payload, block_bytes};
 use gramian_numerics::machine::pages::SpareBuffer;
 use gramian_numerics::model::Model;
+use gramian_numerics::model::kind::{ModelKind, Serves};
 use gramian_numerics::regression::solver::{Known, Solution, Solver};
 use gramian_numerics::surface::Surface;
 
@@ -78,9 +79,9 @@ impl PreparedFit {
         StageTimes { gram: self.gram_time, factor: self.factor_time, ..StageTimes::default() }
     }
 
-    /// The label of the model in metrics.
-    pub fn kind(&self) -> &'static str {
-        if self.is_restored { "restored" } else { self.model.name() }
+    /// Labels of the model in the metrics.
+    pub fn labels(&self) -> [&'static str; 2] {
+        labels(if self.is_restored { None } else { Some(self.model.kind()) })
     }
 
     /// Returns the surface, once it was made.
@@ -97,6 +98,14 @@ impl PreparedFit {
     /// Bytes that are given back when the fit is dropped.
     fn n_reserved(&self) -> usize {
         self.memory.n_bytes() + self.surface.get().map_or(0, |stored| stored.memory.n_bytes())
+    }
+}
+
+/// Labels `kind` and `of` of a model in the metrics. A model that was read from the store has no kind.
+pub fn labels(kind: Option<ModelKind>) -> [&'static str; 2] {
+    match kind {
+        Some(kind) => [kind.solver(), kind.serves().into()],
+        None => ["restored", Serves::Both.into()],
     }
 }
 

@@ -32,8 +32,8 @@ async fn lists_share_a_fit_and_are_answered_as_each_alone() {
     let server = Server::start().await;
     let (points, values) = lists(120, 4);
     let posterior = [
-        "variance",
-        "observation_variance",
+        "variances",
+        "observation_variances",
         "covariance",
         "gradients",
         "gradient_variances",
@@ -41,7 +41,7 @@ async fn lists_share_a_fit_and_are_answered_as_each_alone() {
     ];
     for mean in ["constant", "linear", "zero"] {
         for (route, extra) in [
-            ("/v1/interpolation", json!({"derivatives": 2, "include": ["deviations"]})),
+            ("/v1/interpolation", json!({"derivatives": 2, "include": ["std"]})),
             ("/v1/posterior", json!({"include": posterior, "quantiles": [0.1, 0.5], "threshold": 3.0})),
         ] {
             let mut body =
@@ -60,7 +60,7 @@ async fn lists_share_a_fit_and_are_answered_as_each_alone() {
                         "mean_coefficients" => &alone["diagnostics"][name],
                         name => &alone[name],
                     };
-                    let is_shared = name.contains("varianc") || name.contains("deviations");
+                    let is_shared = name.contains("varianc") || name.contains("std");
                     let found = if is_shared { found } else { &found[at] };
                     // The order of solves and sums differs.
                     assert_close(found, of_alone, 1e-9);
@@ -127,7 +127,7 @@ async fn quantiles_and_exceedances_are_those_of_normal_distributions() {
     let (points, values) = lists(60, 1);
     let kernel = json!({"family": "gauss", "length_scale": 0.8});
     let mut body = json!({"cloud": {"points": points}, "values": values[0], "queries": QUERIES, "kernel": kernel, "alpha": 0.04,
-        "include": ["variance", "observation_variance", "gradient_variances"], "quantiles": [0.025, 0.5, 0.975], "threshold": 0.25});
+        "include": ["variances", "observation_variances", "gradient_variances"], "quantiles": [0.025, 0.5, 0.975], "threshold": 0.25});
     let answer = server.post("/v1/posterior", &body).await.expect_ok();
     let (means, variances) = (numbers(&answer["means"]), numbers(&answer["variances"]));
     for (query, (mean, variance)) in means.iter().zip(&variances).enumerate() {
@@ -141,9 +141,9 @@ async fn quantiles_and_exceedances_are_those_of_normal_distributions() {
     assert!((probabilities[2] - 0.40317086).abs() < 1e-3, "{probabilities:?}");
     assert!(probabilities.iter().all(|p| (0.0..=1.0).contains(p)));
     let deviations = json!({"cloud": {"points": points}, "values": values[0], "queries": QUERIES, "kernel": kernel, "alpha": 0.04,
-        "derivatives": 1, "include": ["deviations"]});
+        "derivatives": 1, "include": ["std"]});
     let deviations = server.post("/v1/interpolation", &deviations).await.expect_ok();
-    let squares: Vec<f64> = numbers(&deviations["gradient_deviations"]).iter().map(|s| s * s).collect();
+    let squares: Vec<f64> = numbers(&deviations["gradient_std"]).iter().map(|s| s * s).collect();
     assert_close(&answer["gradient_variances"], &json!(squares), 1e-14);
     // The variance is 0 at a point that is interpolated exactly.
     body["alpha"] = json!(0.0);
@@ -160,7 +160,7 @@ async fn the_local_solver_has_quantiles_and_exceedances_but_nothing_joint() {
     let server = Server::start().await;
     let (points, values) = lists(300, 1);
     let mut body = json!({"cloud": {"points": points}, "values": values[0], "queries": QUERIES, "solver": "local",
-        "include": ["variance"], "quantiles": [0.5], "threshold": 0.0});
+        "include": ["variances"], "quantiles": [0.5], "threshold": 0.0});
     let answer = server.post("/v1/posterior", &body).await.expect_ok();
     assert_close(&answer["quantiles"][0], &answer["means"], 1e-15);
     assert_eq!(answer["exceedance_probabilities"].as_array().unwrap().len(), 3);
@@ -232,7 +232,7 @@ async fn where_nothing_varies_samples_are_the_means_and_zeros_are_told() {
     assert_eq!(answer["samples"], json!([[1.0, 2.0], [1.0, 2.0], [1.0, 2.0]]));
     // At points without noise the variances are 0 up to rounding, which makes some of them negative.
     let (points, values) = lists(150, 1);
-    let mut body = json!({"cloud": {"points": points}, "values": values[0], "alpha": 0, "include": ["deviations"],
+    let mut body = json!({"cloud": {"points": points}, "values": values[0], "alpha": 0, "include": ["std"],
         "kernel": {"family": "gauss", "length_scale": 0.3}});
     for solver in ["dense", "local"] {
         body["solver"] = json!(solver);
@@ -241,7 +241,7 @@ async fn where_nothing_varies_samples_are_the_means_and_zeros_are_told() {
         // The local solver leaves points out before only rounding is left of a variance.
         let is_told = warnings.iter().any(|warning| warning["code"] == "variance_clamped");
         assert!(is_told || solver == "local", "{warnings:?}");
-        assert!(numbers(&answer["value_deviations"]).iter().all(|deviation| *deviation >= 0.0));
+        assert!(numbers(&answer["value_std"]).iter().all(|deviation| *deviation >= 0.0));
     }
 }
 
@@ -253,12 +253,11 @@ async fn deviations_have_digits_in_every_unit() {
         let body = |solver: &str| {
             json!({"cloud": {"points": points}, "values": [1, 2, 0], "queries": [[0.4 * unit], [3.0 * unit]],
                 "kernel": {"family": "gauss", "length_scale": unit, "variance": variance}, "alpha": 1e-3 * variance,
-                "derivatives": 2, "include": ["deviations"], "solver": solver})
+                "derivatives": 2, "include": ["std"], "solver": solver})
         };
         let dense = server.post("/v1/interpolation", &body("dense")).await.expect_ok();
         let local = server.post("/v1/interpolation", &body("local")).await.expect_ok();
-        for (name, order) in [("value_deviations", 0), ("gradient_deviations", 1), ("hessian_deviations", 2)]
-        {
+        for (name, order) in [("value_std", 0), ("gradient_std", 1), ("hessian_std", 2)] {
             for (a, b) in numbers(&dense[name]).iter().zip(numbers(&local[name])) {
                 let unit = variance.sqrt() / unit.powi(order);
                 assert!(

@@ -69,10 +69,10 @@ fn with_null(route: &Route) -> Value {
         request["alpha"] = json!(1e-6);
     }
     if !route.has_geometry && route.is_geometry() {
-        request["surface"] = json!("signature");
+        request["surface_model"] = json!("signature");
     }
     if route.has_geometry {
-        request["geometry"] = json!({"surface": "signature"});
+        request["surface"] = json!({"model": "signature"});
     }
     request
 }
@@ -164,7 +164,7 @@ async fn safetensors_requests_are_answered_as_json_requests() {
         request.as_object_mut().unwrap().remove("alpha");
         request["noise_variances"] = json!((0..20).map(|i| 1e-6 * f64::from(1 + i)).collect::<Vec<_>>());
         if route.has_geometry {
-            request["geometry"] = json!({"cloud": {"points": fibonacci_sphere(30)}, "alpha": 1e-8});
+            request["surface"] = json!({"cloud": {"points": fibonacci_sphere(30)}, "alpha": 1e-8});
         }
         let first = ask(&server, route.path, &request, JSON).await;
         let second =
@@ -358,7 +358,7 @@ fn large_request() -> Value {
         "kernel": {"family": "gauss", "length_scale": 0.5},
         "alpha": 1e-6,
         "queries": queries,
-        "geometry": {"surface": "signature"},
+        "surface": {"model": "signature"},
     })
 }
 

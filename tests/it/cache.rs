@@ -71,7 +71,7 @@ async fn with_two_factors_only_two_hits_are_a_hit() {
     let server = Server::start().await;
     let mut request = interpolation(100, &[[1.0, 0.0, 0.0]]);
     server.post("/v1/interpolation", &request).await;
-    request["geometry"] = json!({"kernel": {"family": "laplace", "epsilon": 1.0, "length_scale": 1.0}});
+    request["surface"] = json!({"kernel": {"family": "laplace", "epsilon": 1.0, "length_scale": 1.0}});
     let outcome =
         async || server.post("/v1/laplace-beltrami", &request).await.header("cache-status").to_owned();
     assert_eq!(outcome().await, "gramian; fwd=miss; stored");

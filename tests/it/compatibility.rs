@@ -53,8 +53,8 @@ const HARMLESS: [(&str, &str); 13] = [
         "/components/schemas/KernelUsed/properties/length_scale",
         "Absent only in answers to who has sent or freed length_scales, which no client did that was generated before.",
     ),
-    ("/components/schemas/DegenerateReason/enum", DRAFT),
-    ("/components/schemas/SurfaceUsed/enum", DRAFT),
+    ("/components/schemas/FlagReason/enum", DRAFT),
+    ("/components/schemas/SurfaceModelUsed/enum", DRAFT),
     ("/components/schemas/WarningCode/enum", DRAFT),
 ];
 

@@ -108,9 +108,8 @@ fn table() -> Value {
 /// of these.
 #[tokio::test(flavor = "multi_thread")]
 async fn noisy_surfaces_and_tables_asked_for_by_many_at_once_are_made_once() {
-    let surface = json!({"cloud": {"points": noisy_sphere(3000)}, "include": ["deviations", "edge_normals"]});
-    let curve =
-        json!({"cloud": {"points": noisy_circle(1000)}, "include": ["deviations"], "solver": "dense"});
+    let surface = json!({"cloud": {"points": noisy_sphere(3000)}, "include": ["std", "edge_normals"]});
+    let curve = json!({"cloud": {"points": noisy_circle(1000)}, "include": ["std"], "solver": "dense"});
     let requests = [("/v1/curvatures", surface), ("/v1/interpolation", table()), ("/v1/normals", curve)];
     for n_threads in ["2", "16"] {
         let server = Server::with_flags(&["--threads", n_threads]).await;

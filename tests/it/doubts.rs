@@ -19,7 +19,7 @@ fn request(kernel: Value, noise: f64, offset: f64) -> Value {
 }
 
 fn uncertain(answer: &Value) -> Vec<usize> {
-    let entries = answer["degenerate"].as_array().unwrap().iter();
+    let entries = answer["flags"].as_array().unwrap().iter();
     let of_values = entries.filter(|entry| entry["reason"] == "uncertain");
     of_values.map(|entry| entry["query"].as_u64().unwrap() as usize).collect()
 }
@@ -27,7 +27,7 @@ fn uncertain(answer: &Value) -> Vec<usize> {
 /// Counts the queries without a flag, and those among them with an error above half of the root mean square.
 fn unflagged_and_off(answer: &Value) -> (usize, usize) {
     let mut is_flagged = [false; N];
-    for entry in answer["degenerate"].as_array().unwrap() {
+    for entry in answer["flags"].as_array().unwrap() {
         is_flagged[entry["query"].as_u64().unwrap() as usize] = true;
     }
     let found = numbers(&answer["values"]);
@@ -73,7 +73,7 @@ async fn what_is_asked_for_its_deviations_is_judged_by_the_values_as_well() {
         let plain = server.post(path, &body).await.expect_ok();
         assert!(uncertain(&plain).len() > N / 2, "{path}");
         // This kernel takes the values as exact, so its own deviations notice nothing.
-        body["include"] = json!(["deviations"]);
+        body["include"] = json!(["std"]);
         let answer = server.post(path, &body).await.expect_ok();
         assert!(uncertain(&answer).len() >= uncertain(&plain).len(), "{path}");
     }
@@ -84,7 +84,7 @@ async fn a_process_without_second_derivatives_has_no_sure_laplacian() {
     let server = Server::start().await;
     for kernel in [json!({"family": "matern", "nu": 1.5}), json!({"family": "wendland", "smoothness": 2})] {
         let mut body = request(kernel.clone(), 0.0, 0.0);
-        body["geometry"] = json!({"kernel": {"family": "laplace", "epsilon": 1, "length_scale": 1}});
+        body["surface"] = json!({"kernel": {"family": "laplace", "epsilon": 1, "length_scale": 1}});
         let answer = server.post("/v1/laplace-beltrami", &body).await.expect_ok();
         assert_eq!(uncertain(&answer).len(), N, "{kernel}");
         let answer = server.post("/v1/surface-gradient", &body).await.expect_ok();

@@ -183,7 +183,7 @@ async fn counts(process: &Process, kind: &str) -> (String, String) {
         let line = text.lines().find(|line| line.starts_with(name)).unwrap();
         line.rsplit_once(' ').unwrap().1.to_owned()
     };
-    let of_kind = format!("gramian_solvers_prepared_total{{kind=\"{kind}\"}}");
+    let of_kind = format!("gramian_solvers_prepared_total{{kind=\"{kind}\",of=\"both\"}}");
     (value(&of_kind), value("gramian_store_damaged_total"))
 }
 

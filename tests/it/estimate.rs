@@ -45,7 +45,7 @@ fn request(path: &str, n: usize, shift: f64) -> Value {
         request["values"] = json!(values);
     }
     if is_sparse {
-        request["geometry"] = json!({"surface": "local"});
+        request["surface"] = json!({"model": "regression"});
     } else {
         request["kernel"] = json!({"family": "matern", "length_scale": 0.5});
         request["alpha"] = json!(1e-6);
@@ -247,7 +247,7 @@ fn variants(document: &Value, path: &str) -> Vec<Value> {
     let mut all: Vec<Value> = names.iter().map(|name| json!({"include": [name]})).collect();
     if properties.get("derivatives").is_some() {
         all.extend((1..=2).flat_map(|order| {
-            [json!({"derivatives": order}), json!({"derivatives": order, "include": ["deviations"]})]
+            [json!({"derivatives": order}), json!({"derivatives": order, "include": ["std"]})]
         }));
     }
     if path == "/v1/interpolation" || path == "/v1/posterior" {
@@ -257,9 +257,9 @@ fn variants(document: &Value, path: &str) -> Vec<Value> {
         });
         all.extend(local.collect::<Vec<_>>());
     }
-    if properties.get("surface").is_some() {
+    if properties.get("surface_model").is_some() {
         all.extend(
-            ["signature", "local"].map(|surface| json!({"surface": surface, "include": ["deviations"]})),
+            ["signature", "local"].map(|surface| json!({"surface_model": surface, "include": ["std"]})),
         );
     }
     if properties.get("samples").is_some() {
@@ -323,7 +323,8 @@ async fn ratios_of(server: &Server, id: &str, path: &str, requests: &[Value]) ->
         let answer = server.post(path, request).await;
         assert_eq!(answer.status, 200, "{id}: {}", answer.text);
         let took = began.elapsed().as_secs_f64() - parsing_seconds(&answer);
-        let included = ["include", "derivatives", "solver", "surface"].map(|name| request[name].to_string());
+        let included =
+            ["include", "derivatives", "solver", "surface_model"].map(|name| request[name].to_string());
         let d = request["cloud"]["points"][0].as_array().unwrap().len();
         println!("{id} d = {d} {}: expected {expected:.4} s, took {took:.4} s", included.join(" "));
         if expected.max(took) >= LEAST_SECONDS {

@@ -54,15 +54,15 @@ async fn defaults_are_said_in_the_answer_and_pinning_them_repeats_it() {
             };
             assert_eq!(diagnostics["kernel"]["family"], family, "{}", route.path);
             assert!(diagnostics["kernel"]["length_scale"].as_f64().unwrap() > 0.0);
-            assert_eq!(diagnostics["kernel"]["variance"], 1.0);
+            assert_eq!(diagnostics["kernel"]["variances"], 1.0);
             if kernel != "absent" || is_value {
                 assert_eq!(diagnostics["alpha"], 1e-10, "{}", route.path);
             }
             body["kernel"] = diagnostics["kernel"].clone();
             body["alpha"] = diagnostics["alpha"].clone();
             if route.has_geometry {
-                let geometry = &diagnostics["geometry"];
-                body["geometry"] = json!({"kernel": geometry["kernel"], "alpha": geometry["alpha"]});
+                let geometry = &diagnostics["surface"];
+                body["surface"] = json!({"kernel": geometry["kernel"], "alpha": geometry["alpha"]});
             }
             let pinned = server.post(route.path, &body).await;
             assert_eq!(pinned.header("cache-status"), "gramian; hit", "{}", route.path);
@@ -87,15 +87,15 @@ async fn the_surface_may_come_from_another_cloud_and_kernel_than_the_values() {
         "kernel": {"family": "gauss", "length_scale": 1.0},
         "alpha": 1e-12,
         "values": values,
-        "geometry": {
+        "surface": {
             "cloud": {"id": surface},
             "kernel": {"family": "matern", "nu": 4.5, "length_scale": 1.0},
             "alpha": 1e-10,
         },
     });
     let applied = server.post("/v1/laplace-beltrami", &body).await.expect_ok();
-    assert_eq!(applied["diagnostics"]["geometry"]["cloud_id"], surface);
-    assert_eq!(applied["diagnostics"]["geometry"]["kernel"]["family"], "matern");
+    assert_eq!(applied["diagnostics"]["surface"]["cloud_id"], surface);
+    assert_eq!(applied["diagnostics"]["surface"]["kernel"]["family"], "matern");
     assert_eq!(applied["diagnostics"]["kernel"]["family"], "gauss");
     assert_eq!(applied["diagnostics"]["n_points"], 150);
     // On the unit sphere Δz = −2z. Without queries, the answer is at the points of the surface's cloud.
@@ -127,13 +127,13 @@ async fn noise_of_the_values_cloud_is_not_taken_over_to_another_one() {
             let mut body = route.with("/noise_variances", &json!(vec![1e-6; N_POINTS]));
             body.as_object_mut().unwrap().remove("alpha");
             let points: Vec<_> = fibonacci_sphere(n_surface).iter().map(|x| [x[1], x[2], x[0]]).collect();
-            body["geometry"] = json!({"cloud": {"points": points}});
+            body["surface"] = json!({"cloud": {"points": points}});
             let problem = server.post(route.path, &body).await.expect_problem(422, "invalid-request");
-            assert_eq!(problem["errors"][0]["pointer"], "/geometry", "{problem}");
-            body["geometry"]["alpha"] = json!(1e-6);
+            assert_eq!(problem["errors"][0]["pointer"], "/surface", "{problem}");
+            body["surface"]["alpha"] = json!(1e-6);
             let answer = server.post(route.path, &body).await.expect_ok();
             assert!(answer["diagnostics"].get("alpha").is_none());
-            assert_eq!(answer["diagnostics"]["geometry"]["alpha"], 1e-6);
+            assert_eq!(answer["diagnostics"]["surface"]["alpha"], 1e-6);
         }
     }
 }

@@ -120,13 +120,13 @@ impl Case<'_> {
         let applied = self.post("/v1/surface-gradient", values.clone()).await;
         self.check("surface gradient", &applied["gradients"], &self.case["surface_gradient"]);
         let applied = self.post("/v1/laplace-beltrami", values).await;
-        self.check("Laplace–Beltrami", &applied["values"], &self.case["laplace_beltrami"]);
+        self.check("Laplace–Beltrami", &applied["laplacians"], &self.case["laplace_beltrami"]);
         let matrix = self.post("/v1/laplace-beltrami/matrix", json!({})).await;
         self.check("Laplace–Beltrami matrix", &matrix["matrix"], &self.case["laplace_beltrami_matrix"]);
     }
 
     async fn check_posterior(&self) {
-        let include = json!(["variance", "covariance", "log_marginal_likelihood", "gradients"]);
+        let include = json!(["variances", "covariance", "log_marginal_likelihood", "gradients"]);
         let extra = json!({"values": self.case["values"], "include": include});
         let found = self.post("/v1/posterior", extra).await;
         let expected = &self.case["posterior"];

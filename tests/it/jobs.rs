@@ -225,7 +225,7 @@ async fn equal_jobs_at_once_share_one_factorization() {
     }
     let metrics = server.get("/metrics").await.text;
     for line in [
-        "gramian_solvers_prepared_total{kind=\"dense\"} 1\n",
+        "gramian_solvers_prepared_total{kind=\"dense\",of=\"both\"} 1\n",
         "gramian_jobs_ended_total{outcome=\"succeeded\"} 8\n",
         "gramian_jobs{status=\"running\"} 0\n",
         "gramian_jobs{status=\"queued\"} 0\n",

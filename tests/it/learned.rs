@@ -32,7 +32,7 @@ async fn measured_values_need_no_parameters_whatever_their_unit_and_offset() {
     for (factor, offset) in [(1.0, 0.0), (1e-6, 3e-6), (1e6, 1e6), (1.0, 1e6)] {
         let (points, values) = measured(400, 0.05, factor, offset);
         let truth: Vec<f64> = points.iter().map(|x| offset + factor * x[2]).collect();
-        let body = json!({"cloud": {"points": points}, "values": values, "include": ["variance"]});
+        let body = json!({"cloud": {"points": points}, "values": values, "include": ["variances"]});
         let answer = server.post("/v1/posterior", &body).await.expect_ok();
         let (means, variances) = (numbers(&answer["means"]), numbers(&answer["variances"]));
         let deviations: Vec<f64> = variances.iter().map(|variance| variance.sqrt()).collect();
@@ -56,7 +56,7 @@ async fn what_was_learned_can_be_pinned() {
     let queries = [[0.3, 0.4, 0.5], [1.0, 0.0, 0.0], [0.0, 3.0, 0.0]];
     for mean in ["constant", "linear", "zero"] {
         let mut body = json!({"cloud": {"points": points}, "values": values, "queries": queries, "mean": mean,
-            "include": ["variance", "observation_variance", "covariance", "gradients", "log_marginal_likelihood"]});
+            "include": ["variances", "observation_variances", "covariance", "gradients", "log_marginal_likelihood"]});
         let learned = server.post("/v1/posterior", &body).await.expect_ok();
         body["kernel"] = learned["diagnostics"]["kernel"].clone();
         body["alpha"] = learned["diagnostics"]["alpha"].clone();
@@ -74,7 +74,7 @@ async fn one_factor_serves_kernels_of_every_variance() {
     let (points, values) = measured(60, 0.1, 1.0, 0.0);
     let posterior = async |variance: f64| {
         let kernel = json!({"family": "matern", "length_scale": 1.0, "variance": variance});
-        let include = ["variance", "log_marginal_likelihood"];
+        let include = ["variances", "log_marginal_likelihood"];
         let body = json!({"cloud": {"points": points}, "values": values, "queries": [[0.2, 0.3, 0.4]], "kernel": kernel,
             "alpha": 0.01 * variance, "include": include});
         server.post("/v1/posterior", &body).await
@@ -85,7 +85,7 @@ async fn one_factor_serves_kernels_of_every_variance() {
     let four = four.expect_ok();
     assert_eq!(one["means"], four["means"]);
     assert_eq!(4.0 * numbers(&one["variances"])[0], numbers(&four["variances"])[0]);
-    assert_eq!(four["diagnostics"]["kernel"]["variance"], 4.0);
+    assert_eq!(four["diagnostics"]["kernel"]["variances"], 4.0);
     assert_eq!(four["diagnostics"]["alpha"], 0.04);
     let of = |answer: &Value, member: &str| answer["diagnostics"][member].as_f64().unwrap();
     assert!((of(&one, "native_norm_squared") / of(&four, "native_norm_squared") - 4.0).abs() < 1e-12);
@@ -101,7 +101,7 @@ async fn one_factor_serves_kernels_of_every_variance() {
 async fn far_away_the_mean_is_served_with_all_of_the_variance() {
     let server = Server::start().await;
     let (points, values) = measured(100, 0.01, 1.0, 7.0);
-    let body = json!({"cloud": {"points": points}, "values": values, "queries": [[300.0, 0.0, 0.0]], "include": ["variance"]});
+    let body = json!({"cloud": {"points": points}, "values": values, "queries": [[300.0, 0.0, 0.0]], "include": ["variances"]});
     let answer = server.post("/v1/posterior", &body).await.expect_ok();
     let mean = numbers(&answer["diagnostics"]["mean_coefficients"])[0];
     assert!((numbers(&answer["means"])[0] - mean).abs() < 1e-9);
@@ -113,10 +113,10 @@ async fn far_away_the_mean_is_served_with_all_of_the_variance() {
 async fn operators_of_measured_values_have_bars_that_cover() {
     let server = Server::start().await;
     let (points, values) = measured(500, 0.01, 1.0, 0.0);
-    let mut body = json!({"cloud": {"points": points}, "values": values, "include": ["deviations"]});
+    let mut body = json!({"cloud": {"points": points}, "values": values, "include": ["std"]});
     let answer = server.post("/v1/laplace-beltrami", &body).await.expect_ok();
     let truth: Vec<f64> = points.iter().map(|x| -2.0 * x[2]).collect();
-    let (found, bars) = (numbers(&answer["values"]), numbers(&answer["value_deviations"]));
+    let (found, bars) = (numbers(&answer["values"]), numbers(&answer["value_std"]));
     let error = root_mean_square(found.iter().zip(&truth).map(|(a, b)| a - b));
     // If the values were taken as exact, noise would exceed the signal: the Laplacian of noise is 7σ/h².
     assert!(error < 0.1, "{error}");
@@ -124,16 +124,16 @@ async fn operators_of_measured_values_have_bars_that_cover() {
     let answer = server.post("/v1/surface-gradient", &body).await.expect_ok();
     let truth: Vec<f64> =
         points.iter().flat_map(|x| [-x[2] * x[0], -x[2] * x[1], 1.0 - x[2] * x[2]]).collect();
-    let (found, bars) = (numbers(&answer["gradients"]), numbers(&answer["gradient_deviations"]));
+    let (found, bars) = (numbers(&answer["gradients"]), numbers(&answer["gradient_std"]));
     assert!(coverage(&found, &bars, &truth) > 0.88);
-    assert_eq!(answer["degenerate"], json!([]));
+    assert_eq!(answer["flags"], json!([]));
 
     // A kernel that is far too narrow has wide bars, and all queries are flagged.
     body["kernel"] = json!({"family": "gauss", "length_scale": 0.05});
     body["alpha"] = json!(1e-4);
-    body["geometry"] = json!({"surface": "local"});
+    body["surface"] = json!({"model": "regression"});
     let answer = server.post("/v1/laplace-beltrami", &body).await.expect_ok();
-    let flags = answer["degenerate"].as_array().unwrap();
+    let flags = answer["flags"].as_array().unwrap();
     assert_eq!(flags.len(), 500);
     assert!(flags.iter().all(|entry| entry["reason"] == "uncertain"));
 }
@@ -145,30 +145,28 @@ async fn interpolants_have_deviations_of_all_that_is_asked_for() {
     let queries = [[0.3, 0.4, 0.5], [1.0, 0.0, 0.0]];
     let kernel = json!({"family": "matern", "nu": 3.5, "length_scale": 1.0, "variance": 2.0});
     let mut body = json!({"cloud": {"points": points}, "values": values, "queries": queries, "kernel": kernel, "alpha": 4e-4,
-        "derivatives": 2, "include": ["deviations"]});
+        "derivatives": 2, "include": ["std"]});
     let answer = server.post("/v1/interpolation", &body).await.expect_ok();
-    assert_eq!(numbers(&answer["gradient_deviations"]).len(), 6);
-    assert_eq!(numbers(&answer["hessian_deviations"]).len(), 18);
+    assert_eq!(numbers(&answer["gradient_std"]).len(), 6);
+    assert_eq!(numbers(&answer["hessian_std"]).len(), 18);
     let mut asked = body.clone();
     asked.as_object_mut().unwrap().remove("derivatives");
-    asked["include"] = json!(["variance"]);
+    asked["include"] = json!(["variances"]);
     let posterior = server.post("/v1/posterior", &asked).await.expect_ok();
-    for (deviation, variance) in
-        numbers(&answer["value_deviations"]).iter().zip(numbers(&posterior["variances"]))
-    {
+    for (deviation, variance) in numbers(&answer["value_std"]).iter().zip(numbers(&posterior["variances"])) {
         assert!((deviation * deviation - variance).abs() < 1e-12);
     }
     // The local solver agrees, since its neighbourhoods hold all points.
-    asked["include"] = json!(["deviations"]);
+    asked["include"] = json!(["std"]);
     asked["solver"] = json!("local");
     let local = server.post("/v1/interpolation", &asked).await.expect_ok();
-    for (a, b) in numbers(&local["value_deviations"]).iter().zip(numbers(&answer["value_deviations"])) {
+    for (a, b) in numbers(&local["value_std"]).iter().zip(numbers(&answer["value_std"])) {
         assert!((a - b).abs() < 1e-9);
     }
-    assert!(local.get("gradient_deviations").is_none());
+    assert!(local.get("gradient_std").is_none());
     body["solver"] = json!("local");
     let local = server.post("/v1/interpolation", &body).await.expect_ok();
-    for name in ["value_deviations", "gradient_deviations", "hessian_deviations"] {
+    for name in ["value_std", "gradient_std", "hessian_std"] {
         for (a, b) in numbers(&local[name]).iter().zip(numbers(&answer[name])) {
             assert!((a - b).abs() < 1e-6 * b, "{name}: {a} and {b}");
         }
@@ -178,7 +176,7 @@ async fn interpolants_have_deviations_of_all_that_is_asked_for() {
     assert!(posterior.get("gradients").is_none() && posterior.get("variances").is_none());
     let variances = numbers(&posterior["gradient_variances"]);
     assert!(!variances.is_empty());
-    for (variance, deviation) in variances.iter().zip(numbers(&local["gradient_deviations"])) {
+    for (variance, deviation) in variances.iter().zip(numbers(&local["gradient_std"])) {
         assert!((variance - deviation * deviation).abs() < 1e-12 * variance);
     }
     for solver in ["dense", "local"] {
@@ -208,7 +206,7 @@ async fn the_local_solver_learns_as_well() {
     let server = Server::start().await;
     let (points, values) = measured(600, 0.05, 10.0, 1e3);
     let mut body =
-        json!({"cloud": {"points": points}, "values": values, "include": ["variance"], "solver": "local"});
+        json!({"cloud": {"points": points}, "values": values, "include": ["variances"], "solver": "local"});
     let local = server.post("/v1/posterior", &body).await.expect_ok();
     body["solver"] = json!("dense");
     let dense = server.post("/v1/posterior", &body).await.expect_ok();
@@ -235,7 +233,7 @@ async fn the_local_solver_learns_as_well() {
 async fn equal_requests_at_once_learn_once() {
     let server = Server::start().await;
     let (points, values) = measured(300, 0.05, 1.0, 0.0);
-    let body = json!({"cloud": {"points": points}, "values": values, "include": ["variance"]});
+    let body = json!({"cloud": {"points": points}, "values": values, "include": ["variances"]});
     let asked = (0..8).map(|_| server.post("/v1/posterior", &body));
     let answers = futures_util::future::join_all(asked).await;
     let answers: Vec<Value> = answers.into_iter().map(|answer| answer.expect_ok()).collect();

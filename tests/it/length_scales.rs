@@ -40,13 +40,13 @@ async fn values_are_those_of_coordinates_in_units_of_their_length_scales() {
                     "queries": queries, "solver": solver})
             };
             for (path, include) in
-                [("/v1/interpolation", json!([])), ("/v1/posterior", json!(["variance", "gradients"]))]
+                [("/v1/interpolation", json!([])), ("/v1/posterior", json!(["variances", "gradients"]))]
             {
                 let [mut a, mut b] = [body(&ours, &points, &queries), body(&theirs, &divided, &far_queries)];
                 for body in [&mut a, &mut b] {
                     match path {
                         "/v1/posterior" if solver == "dense" => body["include"] = include.clone(),
-                        "/v1/posterior" => body["include"] = json!(["variance"]),
+                        "/v1/posterior" => body["include"] = json!(["variances"]),
                         _ => body["derivatives"] = json!(2),
                     }
                 }

@@ -21,14 +21,14 @@ fn lengths(list: &Value) -> Vec<usize> {
 #[tokio::test]
 async fn a_sphere_is_a_closed_mesh_with_error_bars() {
     let server = Server::start().await;
-    let include = ["curvatures", "deviations"];
+    let include = ["curvatures", "std"];
     let body = json!({"cloud": {"points": fibonacci_sphere(600)}, "include": include});
     let answer = server.post("/v1/level-set", &body).await.expect_ok();
     let parts = answer["parts"].as_array().unwrap();
     assert_eq!((parts.len(), &parts[0]["euler_characteristic"]), (1, &json!(2)), "{parts:?}");
     let k = lengths(&answer["vertices"]).len();
     assert!(lengths(&answer["cells"]).iter().all(|n| *n == 3));
-    for member in ["normals", "support", "residuals", "mean_curvatures", "position_deviations"] {
+    for member in ["normals", "support", "residuals", "mean_curvatures", "position_std"] {
         assert_eq!(answer[member].as_array().unwrap().len(), k, "{member}");
     }
     assert!(numbers(&answer["mean_curvatures"]).iter().all(|mean| (mean - 1.0).abs() < 0.1));
@@ -69,7 +69,7 @@ async fn a_level_of_values_is_a_polyline() {
         .flat_map(|r| circle(8 * r).into_iter().map(move |[x, y]| [x * r as f64 / 6.0, y * r as f64 / 6.0]))
         .collect();
     let values: Vec<f64> = points.iter().map(|[x, y]| x * x + y * y).collect();
-    let body = json!({"cloud": {"points": points}, "values": values, "level": 0.25, "include": ["curvatures", "deviations"]});
+    let body = json!({"cloud": {"points": points}, "values": values, "level": 0.25, "include": ["curvatures", "std"]});
     let answer = server.post("/v1/level-set", &body).await.expect_ok();
     assert_eq!(
         (lengths(&answer["vertices"])[0], &answer["parts"][0]["euler_characteristic"]),
@@ -96,7 +96,7 @@ async fn what_cannot_be_meshed_is_refused_with_a_remedy() {
         (json!({"cloud": {"points": in_four}}), "invalid-cloud", "/cloud/points"),
         (json!({"cloud": sphere, "step": 0.0}), "invalid-request", "/step"),
         (json!({"cloud": sphere, "level": 1.0}), "invalid-request", "/level"),
-        (json!({"cloud": sphere, "surface": "offset"}), "invalid-request", "/surface"),
+        (json!({"cloud": sphere, "surface_model": "offset"}), "invalid-request", "/surface"),
         (json!({"cloud": sphere, "bounds": bounds}), "invalid-request", "/bounds/max/1"),
         (
             json!({"cloud": sphere, "bounds": {"min": [0.0], "max": [1.0]}}),
@@ -113,12 +113,11 @@ async fn what_cannot_be_meshed_is_refused_with_a_remedy() {
 #[tokio::test]
 async fn eight_equal_requests_have_one_mesh() {
     let server = Server::start().await;
-    let body =
-        json!({"cloud": {"points": fibonacci_sphere(1500)}, "surface": "local", "include": ["deviations"]});
+    let body = json!({"cloud": {"points": fibonacci_sphere(1500)}, "surface_model": "regression", "include": ["std"]});
     let asked = (0..8).map(|_| server.post("/v1/level-set", &body));
     let answers: Vec<Value> =
         futures_util::future::join_all(asked).await.into_iter().map(|answer| answer.expect_ok()).collect();
-    for member in ["vertices", "cells", "position_deviations"] {
+    for member in ["vertices", "cells", "position_std"] {
         assert!(answers.iter().all(|answer| answer[member] == answers[0][member]), "{member}");
     }
 }

@@ -102,7 +102,7 @@ async fn problems_beyond_the_limits_are_refused_with_limit_and_need() {
         refuses(route.path, queries, "/queries", 5, 6).await;
         if route.has_geometry {
             let surface = json!({"cloud": {"points": fibonacci_sphere(21)}});
-            refuses(route.path, route.with("/geometry", &surface), "/geometry/cloud/points", 20, 21).await;
+            refuses(route.path, route.with("/surface", &surface), "/surface/cloud/points", 20, 21).await;
         }
         for name in ["values", "noise_variances"].into_iter().skip(usize::from(!route.has_values)) {
             let entries = route.with(&format!("/{name}"), &json!(vec![1.0; 1000]));
@@ -173,7 +173,7 @@ async fn clouds_beyond_the_limit_of_the_dense_solver_are_registered_and_not_fact
             // Asks for the dense solver, because local regressions would serve this surface, whatever the
             // kernel of the values.
             let surface = json!({"cloud": {"id": id}, "solver": "dense"});
-            expect_refused(route.path, route.with("/geometry", &surface), "/geometry/cloud/id").await;
+            expect_refused(route.path, route.with("/surface", &surface), "/surface/cloud/id").await;
         }
         server.post(route.path, &route.request()).await.expect_ok();
     }

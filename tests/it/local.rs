@@ -9,8 +9,7 @@ use crate::support::{Server, fibonacci_sphere, numbers};
 
 /// Checks that each mean curvature is 1 within `tolerance`, with a deviation between 0 and 0.1.
 fn check_unit_curvatures(answer: &Value, tolerance: f64) {
-    let (found, deviations) =
-        (numbers(&answer["mean_curvatures"]), numbers(&answer["mean_curvature_deviations"]));
+    let (found, deviations) = (numbers(&answer["mean_curvatures"]), numbers(&answer["mean_curvature_std"]));
     assert_eq!(found.len(), deviations.len());
     for (curvature, deviation) in found.iter().zip(&deviations) {
         assert!((curvature - 1.0).abs() <= tolerance, "{curvature}");
@@ -22,30 +21,30 @@ fn check_unit_curvatures(answer: &Value, tolerance: f64) {
 async fn deviations_are_asked_for_by_name() {
     let server = Server::start().await;
     let points = fibonacci_sphere(500);
-    let body = json!({"cloud": {"points": points}, "include": ["deviations"]});
+    let body = json!({"cloud": {"points": points}, "include": ["std"]});
     let answer = server.post("/v1/curvatures", &body).await.expect_ok();
     // The spacing is 0.16. Quadrics alone would be off by one per cent.
     check_unit_curvatures(&answer, 1e-2);
-    assert_eq!(numbers(&answer["principal_curvature_deviations"]).len(), 1000);
-    assert_eq!(numbers(&answer["gaussian_curvature_deviations"]).len(), 500);
+    assert_eq!(numbers(&answer["principal_curvature_std"]).len(), 1000);
+    assert_eq!(numbers(&answer["gaussian_curvature_std"]).len(), 500);
     assert_eq!(answer["diagnostics"]["solver"], "local");
-    assert_eq!(answer["surfaces"][0], "local");
-    assert!(answer["diagnostics"]["solver_reason"].as_str().unwrap().contains("deviations"));
+    assert_eq!(answer["surface_models"][0], "local");
+    assert!(answer["diagnostics"]["solver_reason"].as_str().unwrap().contains("std"));
     assert!(answer["diagnostics"].get("rank").is_none());
     let without = server.post("/v1/curvatures", &json!({"cloud": {"points": points}})).await.expect_ok();
-    assert!(without.get("mean_curvature_deviations").is_none());
+    assert!(without.get("mean_curvature_std").is_none());
     assert_eq!(without["diagnostics"]["solver"], "dense");
 }
 
 #[tokio::test]
 async fn a_signature_function_has_deviations_too() {
     let server = Server::start().await;
-    let body = json!({"cloud": {"points": fibonacci_sphere(400)}, "include": ["deviations"],
+    let body = json!({"cloud": {"points": fibonacci_sphere(400)}, "include": ["std"],
         "kernel": {"family": "laplace", "length_scale": 1.0, "epsilon": 1.0}, "alpha": 0.0});
     for path in ["/v1/normals", "/v1/curvatures"] {
         let answer = server.post(path, &body).await.expect_ok();
         assert_eq!(answer["diagnostics"]["solver"], "dense");
-        assert!(numbers(&answer["normal_deviations"]).iter().all(|deviation| *deviation < 0.05));
+        assert!(numbers(&answer["normal_std"]).iter().all(|deviation| *deviation < 0.05));
     }
 }
 
@@ -53,18 +52,18 @@ async fn a_signature_function_has_deviations_too() {
 async fn local_normals_point_outward_also_away_from_the_points() {
     let server = Server::start().await;
     let queries = [[0.0, 0.0, 1.01], [0.6, 0.8, 0.0], [0.0, -0.99, 0.0], [9.0, 0.0, 0.0]];
-    let body = json!({"cloud": {"points": fibonacci_sphere(400)}, "surface": "local", "queries": queries});
+    let body = json!({"cloud": {"points": fibonacci_sphere(400)}, "surface_model": "regression", "queries": queries});
     let answer = server.post("/v1/normals", &body).await.expect_ok();
     for (query, normal) in queries.iter().zip(answer["normals"].as_array().unwrap()).take(3) {
         let cosine: f64 = query.iter().zip(numbers(normal)).map(|(a, b)| a * b).sum();
         assert!(cosine > 0.985, "{normal}");
     }
-    assert_eq!(answer["degenerate"][0]["reason"], "far_from_cloud");
+    assert_eq!(answer["flags"][0]["reason"], "far_from_cloud");
     // The level is 1 minus the height above the surface.
     let levels = numbers(&answer["levels"]);
     assert!((levels[0] - 0.99).abs() < 1e-3 && (levels[2] - 1.01).abs() < 1e-3, "{levels:?}");
     let inward = json!({"orientation": "gradient"});
-    let body = json!({"cloud": body["cloud"], "surface": "local", "queries": queries, "orientation": inward["orientation"]});
+    let body = json!({"cloud": body["cloud"], "surface_model": "regression", "queries": queries, "orientation": inward["orientation"]});
     let turned = server.post("/v1/normals", &body).await.expect_ok();
     assert!((numbers(&turned["normals"])[2] + numbers(&answer["normals"])[2]).abs() < 1e-12);
 }
@@ -105,10 +104,10 @@ async fn sparse_matrices_agree_with_the_operators() {
     assert_eq!((indptr.len(), indptr[600] as usize, data.len()), (601, indices.len(), indices.len()));
     let values: Vec<f64> = points.iter().map(|x| (PI * x[2]).sin()).collect();
     let request = json!({
-        "cloud": {"points": points}, "solver": "local", "values": values, "include": ["deviations"],
+        "cloud": {"points": points}, "solver": "local", "values": values, "include": ["std"],
     });
     let applied = server.post("/v1/laplace-beltrami", &request).await.expect_ok();
-    let deviations = numbers(&applied["value_deviations"]);
+    let deviations = numbers(&applied["value_std"]);
     let applied = numbers(&applied["values"]);
     // The operator reaches π² + 2π. With 600 points the deviations are below 1 % of that.
     let scale = PI * PI + 2.0 * PI;
@@ -145,7 +144,7 @@ async fn too_few_points_for_an_operator_are_said_to_be() {
         let gradient = server.post("/v1/surface-gradient/sparse-matrix", &body).await.expect_ok();
         assert_eq!(gradient["data"].as_array().unwrap().len(), 2);
         for answer in [matrix, applied] {
-            let flags = answer["degenerate"].as_array().unwrap();
+            let flags = answer["flags"].as_array().unwrap();
             assert!(flags.len() == n && flags.iter().all(|flag| flag["reason"] == "under_resolved"));
         }
     }
@@ -159,13 +158,13 @@ async fn what_local_regressions_lack_is_refused_by_name() {
     let cloud = json!({"points": points});
     let kernel = json!({"family": "gauss", "length_scale": 1.0});
     let cases = [
-        ("/v1/curvatures", json!({"cloud": cloud, "surface": "local", "alpha": 0.1}), "/alpha"),
+        ("/v1/curvatures", json!({"cloud": cloud, "surface_model": "regression", "alpha": 0.1}), "/alpha"),
         ("/v1/normals", json!({"cloud": cloud, "solver": "local", "kernel": kernel}), "/kernel"),
         ("/v1/laplace-beltrami/matrix", json!({"cloud": cloud, "solver": "local"}), "/solver"),
         ("/v1/surface-gradient/matrix", json!({"cloud": cloud, "solver": "local"}), "/solver"),
         (
             "/v1/curvatures",
-            json!({"cloud": {"points": vec![[0.0; 5], [1.0; 5]]}, "surface": "local"}),
+            json!({"cloud": {"points": vec![[0.0; 5], [1.0; 5]]}, "surface_model": "regression"}),
             "/surface",
         ),
     ];
@@ -188,7 +187,10 @@ async fn what_local_regressions_lack_is_refused_by_name() {
     let problem = server.post("/v1/normals", &body).await.expect_problem(422, "invalid-request");
     assert_eq!(problem["errors"][0]["pointer"], "/sites/2");
     let body = json!({"cloud": cloud, "values": values, "solver": "local"});
-    assert_eq!(numbers(&server.post("/v1/laplace-beltrami", &body).await.expect_ok()["values"]).len(), 60);
+    assert_eq!(
+        numbers(&server.post("/v1/laplace-beltrami", &body).await.expect_ok()["laplacians"]).len(),
+        60
+    );
 }
 
 #[tokio::test]
@@ -211,8 +213,7 @@ async fn surfaces_are_learned_where_it_is_said() {
 #[tokio::test]
 async fn eight_equal_requests_make_one_surface() {
     let server = Server::start().await;
-    let body =
-        json!({"cloud": {"points": fibonacci_sphere(2000)}, "surface": "local", "include": ["deviations"]});
+    let body = json!({"cloud": {"points": fibonacci_sphere(2000)}, "surface_model": "regression", "include": ["std"]});
     let asked = (0..8).map(|_| server.post("/v1/curvatures", &body));
     let answers: Vec<Value> =
         futures_util::future::join_all(asked).await.into_iter().map(|answer| answer.expect_ok()).collect();
@@ -227,11 +228,11 @@ async fn operators_of_noisy_values_have_bars_that_hold_whatever_the_solver() {
     // Δz = −2z, with noise of 2 % of the field.
     let values: Vec<f64> = points.iter().map(|x| x[2] + 0.012 * random.normal()).collect();
     let body = json!({
-        "cloud": {"points": points}, "values": values, "solver": "local", "include": ["deviations"],
+        "cloud": {"points": points}, "values": values, "solver": "local", "include": ["std"],
     });
     let answer = server.post("/v1/laplace-beltrami", &body).await.expect_ok();
     assert_eq!(answer["diagnostics"]["solver"], "local");
-    let (found, bars) = (numbers(&answer["values"]), numbers(&answer["value_deviations"]));
+    let (found, bars) = (numbers(&answer["values"]), numbers(&answer["value_std"]));
     let off = |i: usize| (found[i] + 2.0 * points[i][2]).abs();
     let n_within = (0..2000).filter(|&i| off(i) <= 1.96 * bars[i]).count();
     assert!(n_within >= 1760, "{n_within} of 2000 within their bars");
@@ -248,11 +249,11 @@ async fn values_far_from_their_nodes_are_flagged_however_near_the_surface_is() {
     let queries = [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]];
     let body = json!({
         "cloud": {"points": nodes}, "values": values, "queries": queries,
-        "geometry": {"cloud": {"points": fibonacci_sphere(600)}},
+        "surface": {"cloud": {"points": fibonacci_sphere(600)}},
     });
     for path in ["/v1/laplace-beltrami", "/v1/surface-gradient"] {
         let answer = server.post(path, &body).await.expect_ok();
-        let flags = answer["degenerate"].as_array().unwrap();
+        let flags = answer["flags"].as_array().unwrap();
         let is_far = |flag: &&Value| flag["reason"] == "far_from_cloud" && flag["query"] == 1;
         assert_eq!(flags.iter().filter(is_far).count(), 1, "{path}: {flags:?}");
         assert!(flags.iter().all(|flag| flag["query"] == 1), "{path}: {flags:?}");

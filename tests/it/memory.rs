@@ -116,7 +116,7 @@ async fn each_factor_and_the_fallback_have_their_memory() {
     };
     let mut two = request(n);
     two["values"] = json!(vec![1.0; n]);
-    two["geometry"] = json!({"kernel": {"family": "matern", "length_scale": 0.4}});
+    two["surface"] = json!({"kernel": {"family": "matern", "length_scale": 0.4}});
     let two = receive(unpooled().post(process.url("/v1/surface-gradient")).json(&two)).await;
     // The first factor is cached, so it requires nothing.
     assert!(expect_refused(two) >= 4 * (n * n) as u64);
@@ -166,7 +166,7 @@ fn posterior(n: usize) -> Value {
     let mut request = request(n);
     request["values"] = json!(vec![1.0; n]);
     request["queries"] = json!(fibonacci_sphere(100));
-    request["include"] = json!(["variance"]);
+    request["include"] = json!(["variances"]);
     request
 }
 

@@ -55,7 +55,7 @@ async fn requests_are_counted_by_route_and_never_by_what_clients_send() {
     assert_eq!(of(r#"gramian_problems_total{type="overloaded"}"#), 0.0);
     assert_eq!(of(r#"gramian_cache_requests_total{outcome="miss"}"#), 1.0);
     assert_eq!(of(r#"gramian_cache_requests_total{outcome="hit"}"#), 3.0);
-    assert_eq!(of(r#"gramian_solvers_prepared_total{kind="dense"}"#), 1.0);
+    assert_eq!(of(r#"gramian_solvers_prepared_total{kind="dense",of="both"}"#), 1.0);
     assert_eq!(of(r#"gramian_cache_entries{part="clouds"}"#), 1.0);
     assert_eq!(of(r#"gramian_cache_evictions_total{part="clouds"}"#), 0.0);
     assert!(of(r#"gramian_memory_used_bytes{part="cache"}"#) > 0.0);

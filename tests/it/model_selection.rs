@@ -62,7 +62,7 @@ async fn each_value_is_predicted_as_if_it_had_been_left_out() {
             json!(all.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, x)| x).collect::<Vec<_>>())
         };
         let others = json!({"cloud": {"points": without(points)}, "values": without(values), "queries": [points[i]],
-            "kernel": asked["kernel"], "alpha": 0.05, "mean": "linear", "include": ["observation_variance"]});
+            "kernel": asked["kernel"], "alpha": 0.05, "mean": "linear", "include": ["observation_variances"]});
         let alone = server.post("/v1/posterior", &others).await.expect_ok();
         let off = |a: &Value, b: &Value| (a.as_f64().unwrap() - b.as_f64().unwrap()).abs();
         assert!(off(&left_out["means"][i], &alone["means"][0]) < 1e-9);
@@ -211,7 +211,7 @@ async fn too_many_points_and_too_much_that_is_free_are_refused_beforehand() {
     for (vary, families, pointer) in [
         (json!([free("length_scale"), free("length_scales")]), json!(["gauss"]), "/vary/0"),
         (json!(vec![free("length_scales"); 65]), json!(["gauss"]), "/vary"),
-        (json!([free("variance"), free("nu")]), json!(["gauss"]), "/vary/1"),
+        (json!([free("variances"), free("nu")]), json!(["gauss"]), "/vary/1"),
         (
             json!([{"parameter": "length_scales", "axis": 1, "min": 0.1, "max": 1}]),
             json!(["gauss"]),
@@ -257,7 +257,7 @@ async fn what_is_selected_is_served_when_it_is_sent_back() {
             let selected = server.post("/v1/model-selection", &asked).await.expect_ok();
             let sent_back = json!({
                 "cloud": {"points": points}, "values": values, "mean": "constant",
-                "include": ["variance", "log_marginal_likelihood"],
+                "include": ["variances", "log_marginal_likelihood"],
                 "kernel": selected["kernel"], "alpha": selected["alpha"], "queries": [points[0]],
             });
             server.post("/v1/posterior", &sent_back).await.expect_ok();

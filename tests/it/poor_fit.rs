@@ -29,7 +29,7 @@ fn poor_fits(answer: &Value) -> Vec<String> {
 #[tokio::test]
 async fn values_that_are_explained_have_no_warning() {
     let server = Server::start().await;
-    let body = with(&measured(300, 0.0), json!({"include": ["variance"]}));
+    let body = with(&measured(300, 0.0), json!({"include": ["variances"]}));
     for more in [json!({}), json!({"solver": "local"}), json!({"mean": "linear"})] {
         let answer = server.post("/v1/posterior", &with(&body, more.clone())).await.expect_ok();
         assert_eq!(poor_fits(&answer), Vec::<String>::new(), "{more}");
@@ -81,9 +81,9 @@ async fn a_given_kernel_is_told_where_deviations_are_asked_for() {
     // The noise of the values is a hundred times the deviation that alpha implies.
     let means = server.post("/v1/interpolation", &body).await.expect_ok();
     assert_eq!(poor_fits(&means), Vec::<String>::new());
-    let answer = server.post("/v1/posterior", &with(&body, json!({"include": ["variance"]}))).await;
+    let answer = server.post("/v1/posterior", &with(&body, json!({"include": ["variances"]}))).await;
     assert!(poor_fits(&answer.expect_ok())[0].contains("leave out kernel and alpha"));
-    let fitting = with(&body, json!({"alpha": 1e-4, "include": ["variance"]}));
+    let fitting = with(&body, json!({"alpha": 1e-4, "include": ["variances"]}));
     let answer = server.post("/v1/posterior", &fitting).await.expect_ok();
     assert_eq!(poor_fits(&answer), Vec::<String>::new());
     // A batch of two lists, of which one is contradicted.
@@ -123,7 +123,7 @@ async fn detail_that_is_taken_for_noise_is_named_whichever_solver_answers() {
 async fn values_whose_squares_leave_float64_have_longer_bars_and_a_warning() {
     let server = Server::start().await;
     let posterior = async |factor: f64| {
-        let mut body = with(&measured(100, 0.0), json!({"include": ["variance"]}));
+        let mut body = with(&measured(100, 0.0), json!({"include": ["variances"]}));
         let values: Vec<f64> = numbers(&body["values"]).iter().map(|value| factor * value).collect();
         body["values"] = json!(values);
         server.post("/v1/posterior", &body).await.expect_ok()

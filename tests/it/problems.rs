@@ -120,12 +120,12 @@ async fn a_member_of_one_route_is_pointed_to_when_null_or_wrong() {
     for (path, names) in [
         ("/v1/interpolation", &["values", "derivatives"][..]),
         ("/v1/posterior", &["values", "include"]),
-        ("/v1/normals", &["surface", "orientation"]),
-        ("/v1/curvatures", &["surface", "orientation"]),
-        ("/v1/surface-gradient", &["values", "geometry"]),
-        ("/v1/surface-gradient/matrix", &["geometry"]),
-        ("/v1/laplace-beltrami", &["values", "geometry"]),
-        ("/v1/laplace-beltrami/matrix", &["geometry", "format"]),
+        ("/v1/normals", &["surface_model", "orientation"]),
+        ("/v1/curvatures", &["surface_model", "orientation"]),
+        ("/v1/surface-gradient", &["values", "surface"]),
+        ("/v1/surface-gradient/matrix", &["surface"]),
+        ("/v1/laplace-beltrami", &["values", "surface"]),
+        ("/v1/laplace-beltrami/matrix", &["surface", "format"]),
     ] {
         let route = ROUTES.iter().find(|route| route.path == path).unwrap();
         for name in names {
@@ -148,14 +148,14 @@ async fn a_member_of_one_route_is_pointed_to_when_null_or_wrong() {
             ("alpha", json!(-1)),
             ("noise_variances", json!(null)),
             ("solver", json!(null)),
-            ("surface", json!(null)),
+            ("surface_model", json!(null)),
         ] {
-            let pointer = format!("/geometry/{name}");
-            let body = route.with("/geometry", &json!({name: value}));
+            let pointer = format!("/surface/{name}");
+            let body = route.with("/surface", &json!({name: value}));
             route.refuses(&server, &body, 422, "invalid-request", &pointer).await;
         }
-        let body = route.with("/geometry", &json!([]));
-        route.refuses(&server, &body, 422, "invalid-request", "/geometry").await;
+        let body = route.with("/surface", &json!([]));
+        route.refuses(&server, &body, 422, "invalid-request", "/surface").await;
     }
 }
 

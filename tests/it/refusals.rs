@@ -36,8 +36,8 @@ async fn one_point_has_values_and_a_degenerate_geometry() {
             let answer = server.post(route.path, &request).await.expect_ok();
             if route.is_geometry() {
                 // The signature function has its maximum at the point, so there is no normal.
-                assert_eq!(answer["degenerate"][0]["query"], 0, "{}", route.path);
-                assert_eq!(answer["degenerate"][0]["reason"], "vanishing_gradient");
+                assert_eq!(answer["flags"][0]["query"], 0, "{}", route.path);
+                assert_eq!(answer["flags"][0]["reason"], "vanishing_gradient");
             } else {
                 let name = if route.path == "/v1/posterior" { "means" } else { "values" };
                 assert!((answer[name][0].as_f64().unwrap() - 3.0).abs() < 1e-6, "{answer}");
@@ -96,7 +96,7 @@ async fn empty_normals_and_variances_count_as_absent() {
         let mut request = route.with("/cloud/normals", &json!([]));
         request["noise_variances"] = json!([]);
         if route.has_geometry {
-            request["geometry"] = json!({"noise_variances": [], "cloud": {"id": id, "normals": []}});
+            request["surface"] = json!({"noise_variances": [], "cloud": {"id": id, "normals": []}});
         }
         assert_eq!(server.post(route.path, &request).await.expect_ok(), plain, "{}", route.path);
         // Rows without coordinates are not an empty list.
@@ -153,11 +153,11 @@ async fn noise_is_said_once_and_is_not_negative() {
     let posterior = route_of("/v1/posterior");
     let mut body = posterior.with("/noise_variances", &json!(vec![1e-3; N_POINTS]));
     body.as_object_mut().unwrap().remove("alpha");
-    body["include"] = json!(["variance"]);
+    body["include"] = json!(["variances"]);
     server.post(posterior.path, &body).await.expect_ok();
-    body["include"] = json!(["variance", "observation_variance"]);
+    body["include"] = json!(["variances", "observation_variances"]);
     posterior.refuses(&server, &body, 422, "invalid-request", "/include").await;
-    body["include"] = json!(["variance", "frobnicate"]);
+    body["include"] = json!(["variances", "frobnicate"]);
     posterior.refuses(&server, &body, 422, "invalid-request", "/include/1").await;
 }
 
@@ -174,8 +174,8 @@ async fn queries_have_the_dimension_of_the_cloud() {
         let null = route.with("/queries", &json!([[0, 0, 2], [0, 0, null]]));
         route.refuses(&server, &null, 422, "invalid-request", "/queries/1/2").await;
         if route.has_geometry {
-            let body = route.with("/geometry", &json!({"cloud": {"points": lattice(9, 2)}}));
-            route.refuses(&server, &body, 422, "dimension-mismatch", "/geometry/cloud").await;
+            let body = route.with("/surface", &json!({"cloud": {"points": lattice(9, 2)}}));
+            route.refuses(&server, &body, 422, "dimension-mismatch", "/surface/cloud").await;
         }
     }
 }
@@ -198,8 +198,8 @@ async fn a_cloud_is_named_or_given_but_not_both() {
             assert!(problem["detail"].as_str().unwrap().len() < 300);
         }
         if route.has_geometry {
-            let body = route.with("/geometry", &json!({"cloud": {"id": unknown}}));
-            route.refuses(&server, &body, 404, "unknown-cloud", "/geometry/cloud/id").await;
+            let body = route.with("/surface", &json!({"cloud": {"id": unknown}}));
+            route.refuses(&server, &body, 404, "unknown-cloud", "/surface/cloud/id").await;
         }
     }
 }

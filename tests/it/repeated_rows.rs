@@ -26,7 +26,7 @@ async fn copies_change_nothing_and_are_counted_whichever_solver_answers() {
         let of = |n_copies: usize| {
             let mut body = measured(400, n_copies);
             body["solver"] = json!(solver);
-            body["include"] = json!(["deviations"]);
+            body["include"] = json!(["std"]);
             body
         };
         let plain = server.post("/v1/interpolation", &of(0)).await.expect_ok();

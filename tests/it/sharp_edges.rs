@@ -22,7 +22,7 @@ async fn normals_of_both_sides_of_an_edge_are_answered_where_they_are_asked_for(
     let body = json!({"cloud": {"points": cube()}, "queries": queries(), "include": ["edge_normals"]});
     for path in ["/v1/normals", "/v1/curvatures"] {
         let answer = server.post(path, &body).await.expect_ok();
-        let flags = answer["degenerate"].as_array().unwrap();
+        let flags = answer["flags"].as_array().unwrap();
         assert!(flags.len() == 1 && flags[0]["query"] == 0 && flags[0]["reason"] == "edge", "{flags:?}");
         let edges = answer["edge_normals"].as_array().unwrap();
         assert!(edges.len() == 2 && edges[1].is_null(), "{edges:?}");
@@ -39,13 +39,14 @@ async fn normals_of_both_sides_of_an_edge_are_answered_where_they_are_asked_for(
     // Not asked for, they are absent.
     let body = json!({"cloud": {"points": cube()}, "queries": queries(), "solver": "local"});
     let answer = server.post("/v1/normals", &body).await.expect_ok();
-    assert!(answer["edge_normals"].is_null() && answer["degenerate"][0]["reason"] == "edge", "{answer}");
+    assert!(answer["edge_normals"].is_null() && answer["flags"][0]["reason"] == "edge", "{answer}");
 }
 
 #[tokio::test]
 async fn a_function_of_all_points_has_no_edges() {
     let server = Server::start().await;
-    for chosen in [json!({"solver": "dense"}), json!({"alpha": 1e-6}), json!({"surface": "signature"})] {
+    for chosen in [json!({"solver": "dense"}), json!({"alpha": 1e-6}), json!({"surface_model": "signature"})]
+    {
         let mut body = json!({"cloud": {"points": cube()}, "include": ["edge_normals"]});
         body.as_object_mut().unwrap().extend(chosen.as_object().unwrap().clone());
         let refused = server.post("/v1/normals", &body).await.expect_problem(422, "unsupported-by-solver");

@@ -49,7 +49,7 @@ type Asked = (&'static str, Value, Vec<(&'static str, f64)>);
 /// Operations of all solvers over all points. Derivatives lose more than values.
 fn operations() -> Vec<Asked> {
     let queries = [[0.6, 0.8, 0.0], [0.0, -0.6, 0.8], [-0.48, 0.64, 0.6]];
-    let on_signature = json!({"surface": "signature"});
+    let on_signature = json!({"model": "signature"});
     vec![
         (
             "/v1/interpolation",
@@ -58,24 +58,24 @@ fn operations() -> Vec<Asked> {
         ),
         (
             "/v1/posterior",
-            json!({"values": true, "queries": queries, "include": ["variance", "covariance", "gradient_variances"],
+            json!({"values": true, "queries": queries, "include": ["variances", "covariance", "gradient_variances"],
                 "mean": "constant"}),
             vec![("means", 1e-8), ("variances", 1e-5), ("covariance", 1e-5), ("gradient_variances", 1e-5)],
         ),
-        ("/v1/normals", json!({"queries": queries, "surface": "signature"}), vec![("normals", 1e-5)]),
+        ("/v1/normals", json!({"queries": queries, "surface_model": "signature"}), vec![("normals", 1e-5)]),
         (
             "/v1/curvatures",
-            json!({"queries": queries, "surface": "signature"}),
+            json!({"queries": queries, "surface_model": "signature"}),
             vec![("mean_curvatures", 1e-3)],
         ),
         (
             "/v1/surface-gradient",
-            json!({"values": true, "queries": queries, "geometry": on_signature}),
+            json!({"values": true, "queries": queries, "surface": on_signature}),
             vec![("gradients", 1e-5)],
         ),
         (
             "/v1/laplace-beltrami",
-            json!({"values": true, "queries": queries, "geometry": on_signature}),
+            json!({"values": true, "queries": queries, "surface": on_signature}),
             vec![("values", 1e-3)],
         ),
     ]
@@ -105,7 +105,7 @@ async fn every_operation_answers_as_with_the_dense_solver() {
 #[tokio::test]
 async fn landmarks_have_matrices_and_conjugate_gradients_have_none() {
     let server = Server::start().await;
-    let more = json!({"queries": [[0.6, 0.8, 0.0]], "geometry": {"surface": "signature"}});
+    let more = json!({"queries": [[0.6, 0.8, 0.0]], "surface": {"model": "signature"}});
     let path = "/v1/laplace-beltrami/matrix";
     let dense = server.post(path, &body("dense", &smooth(), &more)).await.expect_ok();
     let found = server.post(path, &body("landmark", &smooth(), &more)).await.expect_ok();
@@ -216,7 +216,7 @@ async fn beyond_what_is_factorized_auto_takes_landmarks_where_few_are_enough_and
         (json!({"family": "gauss"}), None, "local", "more points"),
     ] {
         let mut body = json!({"cloud": {"points": points}, "values": values, "queries": [[0.0, 0.0, 1.0]],
-            "alpha": 1e-4, "kernel": kernel, "include": ["variance"]});
+            "alpha": 1e-4, "kernel": kernel, "include": ["variances"]});
         if let Some(tolerance) = tolerance {
             body["tolerance"] = json!(tolerance);
         }
@@ -240,7 +240,7 @@ async fn auto_takes_landmarks_where_they_are_faster_than_all_points_and_have_the
         let points = fibonacci_sphere(n);
         let values: Vec<f64> = points.iter().map(|x| (2.0 * x[0]).sin() + x[1] * x[2]).collect();
         let mut body = json!({"cloud": {"points": points}, "values": values, "kernel": kernel,
-            "queries": [[0.6, 0.8, 0.0], [0.0, 0.0, 0.9]], "include": ["variance"]});
+            "queries": [[0.6, 0.8, 0.0], [0.0, 0.0, 0.9]], "include": ["variances"]});
         if let Some(alpha) = alpha {
             body["alpha"] = json!(alpha);
         }

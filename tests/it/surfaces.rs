@@ -55,7 +55,7 @@ fn flagged(answer: &Value, reason: &str) -> Vec<u64> {
         assert_eq!(entry["reason"], reason, "{entry}");
         entry["query"].as_u64().unwrap()
     };
-    answer["degenerate"].as_array().unwrap().iter().map(entry).collect()
+    answer["flags"].as_array().unwrap().iter().map(entry).collect()
 }
 
 /// Returns the cosines between the normals and vectors of any length. No normal may be null.
@@ -89,20 +89,20 @@ async fn a_saddle_without_mean_curvature_is_served_by_the_offset_model() {
     assert!((principal[0] + 1.0).abs() < 1e-3 && (principal[1] - 1.0).abs() < 1e-3, "{principal:?}");
     assert!(numbers(&rescued["normals"])[2].abs() > 1.0 - 1e-6, "{}", rescued["normals"]);
     assert_all_near(&numbers(&rescued["gradient_norms"]), 1.0, 0.01);
-    assert_eq!(rescued["surfaces"], json!(["offset"]));
-    assert_eq!(rescued["degenerate"], json!([]));
+    assert_eq!(rescued["surface_models"], json!(["offset"]));
+    assert_eq!(rescued["flags"], json!([]));
     assert!(detail(&rescued["diagnostics"], "offset_model_used").contains("1 of 1"));
 
-    body["surface"] = json!("auto");
+    body["surface_model"] = json!("auto");
     assert_eq!(server.post("/v1/curvatures", &body).await.expect_ok(), rescued);
     let normals = server.post("/v1/normals", &body).await.expect_ok();
-    assert_eq!((&normals["surfaces"], &normals["normals"]), (&json!(["offset"]), &rescued["normals"]));
+    assert_eq!((&normals["surface_models"], &normals["normals"]), (&json!(["offset"]), &rescued["normals"]));
 
-    body["surface"] = json!("signature");
+    body["surface_model"] = json!("signature");
     let refused = server.post("/v1/curvatures", &body).await.expect_ok();
     assert_eq!(refused["principal_curvatures"], json!([null]));
     assert_eq!(refused["normals"], json!([null]));
-    assert_eq!(refused["surfaces"], json!(["signature"]));
+    assert_eq!(refused["surface_models"], json!(["signature"]));
     assert_eq!(flagged(&refused, "vanishing_gradient"), [0]);
     assert!(!codes(&refused["diagnostics"]).contains(&"offset_model_used"));
 }
@@ -120,8 +120,8 @@ async fn operators_live_on_the_surface_that_was_chosen() {
     });
     let rescued = server.post("/v1/laplace-beltrami", &body).await.expect_ok();
     assert_all_near(&numbers(&rescued["values"]), 2.0, 0.01);
-    assert!(detail(&rescued["diagnostics"]["geometry"], "offset_model_used").contains("1 of 1"));
-    body["geometry"] = json!({"surface": "signature"});
+    assert!(detail(&rescued["diagnostics"]["surface"], "offset_model_used").contains("1 of 1"));
+    body["surface"] = json!({"model": "signature"});
     let refused = server.post("/v1/laplace-beltrami", &body).await.expect_ok();
     assert_eq!(refused["values"], json!([null]));
     assert_eq!(flagged(&refused, "vanishing_gradient"), [0]);
@@ -134,13 +134,13 @@ async fn the_offset_model_needs_no_derivatives_of_the_kernel() {
     for kernel in [json!({"family": "laplace", "epsilon": 0}), json!({"family": "matern", "nu": 0.5})] {
         let mut body = json!({"cloud": {"points": sphere}, "kernel": kernel});
         server.post("/v1/curvatures", &body).await.expect_problem(422, "kernel-not-smooth");
-        body["surface"] = json!("offset");
+        body["surface_model"] = json!("offset");
         let answer = server.post("/v1/curvatures", &body).await.expect_ok();
         assert_eq!(numbers(&answer["principal_curvatures"]).len(), 600);
         assert_all_near(&numbers(&answer["principal_curvatures"]), 1.0, 0.03);
         assert_all_near(&cosines(&answer, &sphere), 1.0, 1e-4);
-        assert_eq!(answer["surfaces"], json!(vec!["offset"; 300]));
-        assert_eq!(answer["degenerate"], json!([]));
+        assert_eq!(answer["surface_models"], json!(vec!["offset"; 300]));
+        assert_eq!(answer["flags"], json!([]));
         assert!(detail(&answer["diagnostics"], "offset_model_used").contains("300 of 300"));
     }
 }
@@ -153,7 +153,7 @@ async fn outward_is_the_side_of_the_clients_normals() {
     let clouds = [(json!({"points": sphere}), 1.0), (json!({"points": sphere, "normals": normals}), -1.0)];
     for (cloud, outward) in clouds {
         for surface in ["signature", "offset"] {
-            let body = json!({"cloud": cloud, "surface": surface, "orientation": "outward"});
+            let body = json!({"cloud": cloud, "surface_model": surface, "orientation": "outward"});
             let answer = server.post("/v1/curvatures", &body).await.expect_ok();
             assert_all_near(&cosines(&answer, &sphere), outward, 1e-4);
             assert_all_near(&numbers(&answer["principal_curvatures"]), outward, 0.03);
@@ -201,7 +201,7 @@ async fn flipped_signs_are_repaired_and_reported() {
     let mut body = json!({
         "cloud": {"points": points},
         "kernel": {"family": "gauss", "length_scale": 0.3},
-        "surface": "signature",
+        "surface_model": "signature",
     });
     let repaired = server.post("/v1/normals", &body).await.expect_ok();
     let words = detail(&repaired["diagnostics"], "orientation_repaired");
@@ -243,10 +243,10 @@ async fn curvatures_that_see_the_cusp_of_the_kernel_are_served_and_flagged() {
 
     // The cusp does not affect normals, and a rounder kernel has none.
     let normals = server.post("/v1/normals", &body).await.expect_ok();
-    assert_eq!((&normals["degenerate"], codes(&normals["diagnostics"]).len()), (&json!([]), 0));
+    assert_eq!((&normals["flags"], codes(&normals["diagnostics"]).len()), (&json!([]), 0));
     body["kernel"]["epsilon"] = json!(0.25);
     let smooth = server.post("/v1/curvatures", &body).await.expect_ok();
-    assert_eq!(smooth["degenerate"], json!([]));
+    assert_eq!(smooth["flags"], json!([]));
     assert!(!codes(&smooth["diagnostics"]).contains(&"kernel_too_rough"));
     assert_all_near(&numbers(&smooth["mean_curvatures"]), 1.0, 0.01);
 
@@ -271,11 +271,11 @@ async fn a_query_far_from_the_cloud_is_served_and_flagged() {
     }
     let mut body = body.clone();
     body["values"] = json!(sphere.iter().map(|x| x[2]).collect::<Vec<_>>());
-    for (path, member) in [("/v1/laplace-beltrami", "values"), ("/v1/surface-gradient", "gradients")] {
+    for (path, member) in [("/v1/laplace-beltrami", "laplacians"), ("/v1/surface-gradient", "gradients")] {
         let answer = server.post(path, &body).await.expect_ok();
         assert_eq!(flagged(&answer, "far_from_cloud"), [1], "{path}");
         assert!(answer[member].as_array().unwrap().iter().all(|entry| !entry.is_null()), "{path}");
-        detail(&answer["diagnostics"]["geometry"], "far_from_cloud");
+        detail(&answer["diagnostics"]["surface"], "far_from_cloud");
         assert_eq!(codes(&answer["diagnostics"]), [""; 0], "{path}");
     }
 }
@@ -303,7 +303,7 @@ async fn curvatures_that_the_neighbours_do_not_confirm_are_served_and_flagged() 
     for path in ["/v1/laplace-beltrami", "/v1/laplace-beltrami/matrix", "/v1/surface-gradient"] {
         let answer = server.post(path, &request(path)).await.expect_ok();
         assert_eq!(flagged(&answer, "under_resolved"), everything, "{path}");
-        let geometry = &answer["diagnostics"]["geometry"];
+        let geometry = &answer["diagnostics"]["surface"];
         assert!(detail(geometry, "disagrees_with_neighbours").contains("40 of 40"), "{path}");
         let member = match path {
             "/v1/surface-gradient" => "gradients",
@@ -312,13 +312,13 @@ async fn curvatures_that_the_neighbours_do_not_confirm_are_served_and_flagged() 
         };
         assert!(answer[member].as_array().unwrap().iter().all(|entry| !entry.is_null()), "{path}");
     }
-    assert_eq!(server.post("/v1/normals", &body).await.expect_ok()["degenerate"], json!([]));
+    assert_eq!(server.post("/v1/normals", &body).await.expect_ok()["flags"], json!([]));
 
     // With 40 points, quadrics fit a sphere too badly to confirm anything, so here are 100.
     body["cloud"]["points"] = json!(fibonacci_sphere(100));
     body["kernel"]["length_scale"] = json!(4.0);
     let wide = server.post("/v1/curvatures", &body).await.expect_ok();
-    assert_eq!((&wide["degenerate"], codes(&wide["diagnostics"]).len()), (&json!([]), 0));
+    assert_eq!((&wide["flags"], codes(&wide["diagnostics"]).len()), (&json!([]), 0));
     assert_all_near(&numbers(&wide["mean_curvatures"]), 1.0, 0.02);
 }
 
@@ -381,7 +381,7 @@ async fn merged_points_average_their_normals() {
     server.post("/v1/curvatures", &body).await.expect_problem(422, "duplicate-points");
     body["duplicates"] = json!("merge");
     for surface in ["signature", "offset"] {
-        body["surface"] = json!(surface);
+        body["surface_model"] = json!(surface);
         let answer = server.post("/v1/curvatures", &body).await.expect_ok();
         assert_eq!(answer["diagnostics"]["n_merged_duplicates"], 3);
         assert!(detail(&answer["diagnostics"], "duplicates_merged").contains('3'));
@@ -403,7 +403,7 @@ async fn gradients_below_the_least_normal_number_are_no_normals() {
         "cloud": {"points": fibonacci_sphere(40)},
         "kernel": {"family": "gauss", "length_scale": 1.0},
         "alpha": 1e-3,
-        "surface": "signature",
+        "surface_model": "signature",
         "queries": queries,
     });
     let mut n_subnormal = 0;
@@ -415,7 +415,7 @@ async fn gradients_below_the_least_normal_number_are_no_normals() {
             if *norm < f64::MIN_POSITIVE {
                 n_subnormal += usize::from(*norm > 0.0);
                 assert!(answer["normals"][query].is_null(), "{norm:e}");
-                let mut entries = answer["degenerate"].as_array().unwrap().iter();
+                let mut entries = answer["flags"].as_array().unwrap().iter();
                 let entry = entries.find(|entry| entry["query"] == query).unwrap();
                 assert_eq!(entry["reason"], "vanishing_gradient");
             }

@@ -17,7 +17,7 @@ async fn a_part_with_the_hyperparameters_of_the_whole_answers_as_the_whole() {
     let points = fibonacci_sphere(3000);
     let (part, own) = cap(&points, 1.0);
     let queries: Vec<_> = own.iter().map(|&at| part[at]).collect();
-    let ask = |cloud: &[[f64; 3]]| json!({"cloud": {"points": cloud}, "solver": "local", "include": ["deviations"], "queries": queries});
+    let ask = |cloud: &[[f64; 3]]| json!({"cloud": {"points": cloud}, "solver": "local", "include": ["std"], "queries": queries});
     let whole = server.post("/v1/curvatures", &ask(&points)).await.expect_ok();
     let known = &whole["diagnostics"]["hyperparameters"];
     assert_eq!((&known["means"], &whole["diagnostics"]["reach"]), (&json!([]), &json!(152)));
@@ -25,7 +25,7 @@ async fn a_part_with_the_hyperparameters_of_the_whole_answers_as_the_whole() {
     body["hyperparameters"] = known.clone();
     let answer = server.post("/v1/curvatures", &body).await.expect_ok();
     assert_eq!(&answer["diagnostics"]["hyperparameters"], known);
-    for member in ["normals", "mean_curvatures", "mean_curvature_deviations"] {
+    for member in ["normals", "mean_curvatures", "mean_curvature_std"] {
         let (of_part, of_whole) = (numbers(&answer[member]), numbers(&whole[member]));
         // Rounding of neighbours at equal distances, which the two trees visit in different orders.
         assert!(of_part.iter().zip(&of_whole).all(|(a, b)| (a - b).abs() < 1e-9), "{member}");
@@ -67,7 +67,7 @@ async fn hyperparameters_out_of_range_are_refused_by_their_place() {
         assert_eq!(problem["errors"][0]["pointer"], format!("/hyperparameters/{member}"));
     }
     for path in ["/v1/normals", "/v1/curvatures"] {
-        let body = json!({"cloud": cloud, "surface": "signature", "hyperparameters": known});
+        let body = json!({"cloud": cloud, "surface_model": "signature", "hyperparameters": known});
         let problem = server.post(path, &body).await.expect_problem(422, "unsupported-by-solver");
         assert_eq!(problem["errors"][0]["pointer"], "/hyperparameters", "{path}");
     }

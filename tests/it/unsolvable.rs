@@ -14,9 +14,9 @@ async fn wendland_kernels_end_at_dimension_three() {
         body["cloud"]["points"] = json!(lattice(N_POINTS, 4));
         route.refuses(&server, &body, 422, "kernel-not-positive-definite", "/kernel/family").await;
         if route.has_geometry {
-            body["geometry"] = json!({"kernel": body["kernel"]});
+            body["surface"] = json!({"kernel": body["kernel"]});
             body["kernel"] = json!({"family": "matern", "length_scale": 1.0});
-            let pointer = "/geometry/kernel/family";
+            let pointer = "/surface/kernel/family";
             route.refuses(&server, &body, 422, "kernel-not-positive-definite", pointer).await;
         }
     }
@@ -45,7 +45,7 @@ async fn coinciding_points_are_listed_when_alpha_is_zero() {
 async fn coinciding_points_of_the_values_cloud_are_pointed_to_there_when_only_the_surface_has_alpha_zero() {
     let server = Server::start().await;
     for route in ROUTES.iter().filter(|route| route.has_geometry) {
-        let mut body = route.with("/geometry", &json!({"alpha": 0}));
+        let mut body = route.with("/surface", &json!({"alpha": 0}));
         body["cloud"]["points"][17] = body["cloud"]["points"][4].clone();
         let problem = route.refuses(&server, &body, 422, "duplicate-points", "/cloud/points/4").await;
         assert_eq!(problem["point_indices"], json!([4, 17]));
@@ -92,7 +92,7 @@ async fn what_is_not_positive_definite_names_an_alpha_that_works() {
             body["alpha"] = json!(0);
             body["cloud"] = json!({"points": fibonacci_sphere(200)});
             body["values"] = json!(vec![1.0; 200]);
-            for include in ["variance", "covariance", "log_marginal_likelihood"] {
+            for include in ["variances", "covariance", "log_marginal_likelihood"] {
                 body["include"] = json!([include]);
                 let problem = posterior.refuses(&server, &body, 422, "not-positive-definite", "/alpha").await;
                 let minimum_alpha = problem["minimum_alpha"].as_f64().unwrap();
@@ -148,12 +148,12 @@ async fn what_has_no_number_is_refused_and_is_never_null() {
     let server = Server::start().await;
     let points = fibonacci_sphere(N_POINTS);
     let values = |size: f64| (0..N_POINTS).map(|i| size * (i as f64).sin()).collect::<Vec<_>>();
-    let likelihood = json!(["variance", "log_marginal_likelihood"]);
+    let likelihood = json!(["variances", "log_marginal_likelihood"]);
     let (mut n_refused, mut n_answered) = (0, 0);
     for size in [1.0, 1e100, 1e150, 1e155, 1e160, 1e200, 1e300] {
         for (path, extra) in [
-            ("/v1/interpolation", json!({"derivatives": 2, "include": ["deviations"]})),
-            ("/v1/interpolation/batch", json!({"derivatives": 2, "include": ["deviations"]})),
+            ("/v1/interpolation", json!({"derivatives": 2, "include": ["std"]})),
+            ("/v1/interpolation/batch", json!({"derivatives": 2, "include": ["std"]})),
             ("/v1/posterior", json!({"include": likelihood, "mean": "linear", "quantiles": [0.1]})),
             ("/v1/posterior/batch", json!({"include": likelihood, "mean": "linear", "quantiles": [0.1]})),
         ] {

@@ -47,7 +47,7 @@ async fn the_local_solver_answers_nearly_as_the_dense_one() {
         }
     }
     let body =
-        |solver| with(request(solver), "include", json!(["variance", "observation_variance", "gradients"]));
+        |solver| with(request(solver), "include", json!(["variances", "observation_variances", "gradients"]));
     let local = server.post("/v1/posterior", &body("local")).await.expect_ok();
     let dense = server.post("/v1/posterior", &body("dense")).await.expect_ok();
     for name in ["means", "variances", "observation_variances"] {
@@ -65,7 +65,7 @@ async fn a_cloud_of_one_neighbourhood_has_the_dense_answers() {
         let mut body = request(solver);
         body["cloud"] = json!({"points": fibonacci_sphere(100)});
         body["values"] = json!(numbers(&body["values"])[..100]);
-        body["include"] = json!(["variance"]);
+        body["include"] = json!(["variances"]);
         body
     };
     let local = server.post("/v1/posterior", &small("local")).await.expect_ok();
@@ -130,7 +130,7 @@ async fn beyond_what_is_factorized_the_local_solver_is_chosen_and_says_why() {
         }
         server.post(path, &request("dense")).await.expect_problem(413, "problem-too-large");
     }
-    let body = with(request("auto"), "include", json!(["variance", "covariance"]));
+    let body = with(request("auto"), "include", json!(["variances", "covariance"]));
     let problem = server.post(ROUTES[1], &body).await.expect_problem(413, "problem-too-large");
     assert!(problem["detail"].as_str().unwrap().contains("leave out covariance"), "{problem}");
     assert_eq!(problem["errors"][0]["pointer"], "/cloud/points");
@@ -140,7 +140,7 @@ async fn beyond_what_is_factorized_the_local_solver_is_chosen_and_says_why() {
 async fn what_needs_all_points_at_once_is_refused_where_it_is_asked_for() {
     let server = Server::start().await;
     for quantity in ["covariance", "log_marginal_likelihood"] {
-        let body = with(request("local"), "include", json!(["variance", quantity]));
+        let body = with(request("local"), "include", json!(["variances", quantity]));
         let problem = server.post(ROUTES[1], &body).await.expect_problem(422, "unsupported-by-solver");
         assert_eq!(problem["errors"][0]["pointer"], "/include");
         let detail = problem["detail"].as_str().unwrap();

@@ -65,7 +65,7 @@ test("links choose among the words of the page, and nothing else", () => {
   }
   for (const [name, text] of [
     ["solver", "iterative"],
-    ["surface", "offset"],
+    ["surface_model", "offset"],
     ["family", "laplace"],
     ["quality", "raw"],
   ]) {
@@ -94,7 +94,7 @@ for (const language of Object.keys(LANGUAGES)) {
       const hash = `#${new URLSearchParams({ solver: text, surface: text, family: text, operation: text })}`;
       const request = requestOf(fromHash(hash, words));
       const given = { address: "http://localhost:8080/", cloudId: "0", operation: "curvatures", request };
-      assert.deepEqual(request, { include: ["deviations"] });
+      assert.deepEqual(request, { include: ["std"] });
       assert.ok(asked(language, snippet(language, given)).length > 0);
     }
   });

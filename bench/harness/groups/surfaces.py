@@ -38,7 +38,7 @@ def laplacians(setting: Setting, client: Client) -> Iterable[Row]:
 
     def ours() -> Floats:
         request = {"cloud": {"points": points}, "kernel": KERNEL, "values": harmonic(points)}
-        return np.array(ask(client, "/v1/laplace-beltrami", request)["values"])
+        return np.array(ask(client, "/v1/laplace-beltrami", request)["laplacians"])
 
     def theirs() -> Floats:
         # The stiffness matrix L is weak and positive: Δu = −M⁻¹ L u with the lumped mass matrix M.

@@ -169,7 +169,7 @@ def run(n_rounds: int, methods: dict[str, Method], n: int, m: int) -> tuple[dict
 
 
 def posterior_request(process: Process, points: Floats, values: Floats, queries: Floats) -> dict[str, Any]:
-    return {**request_of(process, points, values, queries), "include": ["variance"]}
+    return {**request_of(process, points, values, queries), "include": ["variances"]}
 
 
 def request_of(process: Process, points: Floats, values: Floats, queries: Floats) -> dict[str, Any]:
@@ -189,7 +189,7 @@ def encode_by_standard_library(request: Any) -> bytes:
 
 
 def by_safetensors(client: Client, points: Floats, values: Floats, queries: Floats) -> tuple[Floats, Floats]:
-    fields = {"kernel": ROUGH.kernel, "alpha": ROUGH.alpha, "include": ["variance"]}
+    fields = {"kernel": ROUGH.kernel, "alpha": ROUGH.alpha, "include": ["variances"]}
     body = save_safetensors({"cloud.points": points, "values": values, "queries": queries}, {"request": json.dumps(fields)})
     headers = {"Content-Type": SAFETENSORS, "Accept": SAFETENSORS}
     answer = client.request("POST", "/v1/posterior", body, headers)

@@ -52,10 +52,10 @@ LOCAL = (
     Request("normals", "/v1/normals, local", "/v1/normals", {"solver": "local"}, "#222222"),
     Request("curvatures", "/v1/curvatures, local", "/v1/curvatures", {"solver": "local"}, "#1b6ca8"),
     Request(
-        "deviations",
+        "std",
         "/v1/curvatures, local, with deviations",
         "/v1/curvatures",
-        {"solver": "local", "include": ["deviations"]},
+        {"solver": "local", "include": ["std"]},
         "#c2571a",
     ),
 )

@@ -130,7 +130,7 @@ class Iterative:
         )
 
         def ours() -> Entry:
-            request = {"solver": "iterative", "surface": "auto"}
+            request = {"solver": "iterative", "surface_model": "auto"}
             work = self.service.ask("/v1/normals", cloud.points, request)
             figures = {**angles(work, cloud, is_signed=True), **said(work)}
             figures["flipped"] = angles(work, agreeing, is_signed=True)["flipped"]

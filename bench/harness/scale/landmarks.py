@@ -43,7 +43,7 @@ class Landmarks:
 
     def small(self) -> Work:
         """A posterior of 2,000 points by at most 350 landmarks, beside scikit-learn's."""
-        kernel, request = {**GAUSS, "length_scale": 1.75}, {"include": ["variance"], "alpha": 1e-2}
+        kernel, request = {**GAUSS, "length_scale": 1.75}, {"include": ["variances"], "alpha": 1e-2}
         n, m = self.setting.size(2_000, 500), self.setting.size(1_000, 100)
 
         def theirs() -> Done:
@@ -83,7 +83,7 @@ class Landmarks:
 
     def surface(self, n_points: int, cost: tuple[Bound, ...]) -> Work:
         n = self.setting.size(n_points, 2_000)
-        request = {"kernel": GAUSS, "alpha": SURFACE_ALPHA, "solver": "landmark", "surface": "signature"}
+        request = {"kernel": GAUSS, "alpha": SURFACE_ALPHA, "solver": "landmark", "surface_model": "signature"}
 
         def ours() -> Entry:
             cloud = torus(n)
@@ -98,7 +98,7 @@ class Landmarks:
 
     def posterior(self) -> Work:
         n, m = self.setting.size(1_000_000, 4_000), self.setting.size(10_000, 500)
-        request = {"kernel": GAUSS, "alpha": ALPHA, "include": ["variance"], "solver": "landmark"}
+        request = {"kernel": GAUSS, "alpha": ALPHA, "include": ["variances"], "solver": "landmark"}
 
         def ours() -> Entry:
             checked = [self.setting.size(size, 1_000) for size in (4_000, 20_000)]

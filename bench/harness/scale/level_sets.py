@@ -163,11 +163,11 @@ class LevelSets:
                 for spacings in (0.5, 1.0):
                     noise = spacings * spacing_of(points) * np.random.default_rng(1).standard_normal(points.shape)
                     try:
-                        work = self.service.ask(PATH, points + noise, {"include": ["deviations"]})
+                        work = self.service.ask(PATH, points + noise, {"include": ["std"]})
                     except NotServed:
                         shares[f"{name} {spacings}, refused"] = 0.0
                         continue
-                    deviations = np.ravel(work.arrays["position_deviations"])
+                    deviations = np.ravel(work.arrays["position_std"])
                     known = np.isfinite(deviations)
                     covered = off(work.arrays["vertices"][known]) <= accuracy.BAND * deviations[known]
                     shares[f"{name} {spacings}"] = 100 * float(covered.mean())

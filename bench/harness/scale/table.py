@@ -29,7 +29,7 @@ ALPHA = 1e-4
 #: Number of rounds for work that takes milliseconds.
 N_ROUNDS = 9
 
-DEVIATIONS = {"include": ["deviations"]}
+DEVIATIONS = {"include": ["std"]}
 ANGLES = {"median": "°", "95 %": "°", "flipped": "%"}
 CURVATURES = {"median": "%", "95 %": "%", "unflagged": "%", "bands cover": "%"}
 
@@ -142,7 +142,7 @@ class Table:
 
     def posterior(self) -> Work:
         n, n_queries, n_dense = (self.setting.size(*sizes) for sizes in ((N_CUBE, 4_000), (N_QUERIES, 500), (N_DENSE, 1_000)))
-        request = {"kernel": MATERN, "alpha": ALPHA, "include": ["variance"]}
+        request = {"kernel": MATERN, "alpha": ALPHA, "include": ["variances"]}
         points, queries = cube(n, 0), cube(n_queries, 1)
         values = wave(points) + np.sqrt(ALPHA) * np.random.default_rng(2).standard_normal(n)
 
@@ -286,7 +286,7 @@ def curved(work: Done, cloud: Cloud) -> dict[str, Figure]:
 def bands(work: Done, cloud: Cloud) -> dict[str, Figure]:
     """Returns the percentage of error bands of the mean curvature that contain the truth."""
     found, exact, known = _curvatures(work, cloud)
-    deviations = work.arrays["mean_curvature_deviations"][known]
+    deviations = work.arrays["mean_curvature_std"][known]
     return {"bands cover": Figure(accuracy.coverage(found.mean(axis=1), deviations, exact.mean(axis=1)), "%")}
 
 
@@ -306,7 +306,7 @@ def percent(share: float) -> Figure:
 
 
 def n_flagged(work: Answered) -> int:
-    return len({item["query"] for item in work.members.get("degenerate", [])})
+    return len({item["query"] for item in work.members.get("flags", [])})
 
 
 def notes(work: Answered) -> str:

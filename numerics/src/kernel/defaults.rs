@@ -122,7 +122,7 @@ mod tests {
             let model = SurfaceModel::Signature;
             let request = GeometryRequest { model, checks_curvatures: false, ..GeometryRequest::CURVATURES };
             let geometry = Geometry::of(&surface, &cloud, &request, &Unobserved).unwrap();
-            assert!(geometry.degenerate().is_empty(), "{n} points");
+            assert!(geometry.flags().is_empty(), "{n} points");
             for query in 0..n {
                 let cosine: f64 =
                     geometry.normal(query).iter().zip(cloud.point(query)).map(|(a, b)| a * b).sum();

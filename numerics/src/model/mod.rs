@@ -6,6 +6,7 @@
 //! [`NumericsError::Unsupported`].
 
 pub mod choose;
+pub mod kind;
 mod making;
 pub mod price;
 mod process;
@@ -60,24 +61,6 @@ impl Model {
                 Method::Cholesky | Method::PivotedCholesky => SolverKind::Dense,
             },
             Self::LocalKriging(_) | Self::LocalSurface => SolverKind::Local,
-        }
-    }
-
-    /// Returns the label of the model in metrics.
-    ///
-    /// `dense` is a factorization of the whole matrix, `pivoted` one of its pivots, `landmark` one of
-    /// landmarks, and `iterative` conjugate gradients. `moving` is local kriging, and `local` stands for
-    /// local regressions.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::System(solver) => match solver.method() {
-                Method::Cholesky => "dense",
-                Method::PivotedCholesky => "pivoted",
-                Method::Landmark => "landmark",
-                Method::ConjugateGradients => "iterative",
-            },
-            Self::LocalKriging(_) => "moving",
-            Self::LocalSurface => "local",
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::Operator;
 use crate::machine::vector::{dot, norm};
-use crate::surface::degeneracy::Resolution;
+use crate::surface::flags::Resolution;
 
 /// Relative error on the test function beyond which nodes do not resolve the surface.
 const UNRESOLVED: f64 = 0.1;

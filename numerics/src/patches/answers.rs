@@ -33,9 +33,9 @@ pub struct PatchGeometry {
     /// Height of the query above the surface along the normal, `[m]`, L.
     pub heights: Vec<f64>,
     /// Standard deviations of the surface along the normal, `[m]`, L.
-    pub height_deviations: Vec<f64>,
+    pub height_std: Vec<f64>,
     /// Standard deviations of the angles of the normals, `[m]`, radians.
-    pub normal_deviations: Vec<f64>,
+    pub normal_std: Vec<f64>,
     /// Deviations of the curvatures, if asked for.
     pub curvatures: Option<CurvatureDeviations>,
 }
@@ -82,8 +82,8 @@ impl PatchGeometry {
             shapes: vec![0.0; m * d * d],
             is_at_rim: vec![false; m],
             heights: vec![0.0; m],
-            height_deviations: vec![0.0; m],
-            normal_deviations: vec![0.0; m],
+            height_std: vec![0.0; m],
+            normal_std: vec![0.0; m],
             curvatures,
         }
     }
@@ -103,22 +103,13 @@ impl PatchGeometry {
         }
         curvatures.resize_with(n_slots, || None);
         let vectors = self.normals.chunks_mut(lanes * d).zip(self.shapes.chunks_mut(lanes * d * d));
-        let heights = self.heights.chunks_mut(lanes).zip(self.height_deviations.chunks_mut(lanes));
-        let numbers = heights.zip(self.normal_deviations.chunks_mut(lanes));
+        let heights = self.heights.chunks_mut(lanes).zip(self.height_std.chunks_mut(lanes));
+        let numbers = heights.zip(self.normal_std.chunks_mut(lanes));
         let flags = self.is_known.chunks_mut(lanes).zip(self.is_at_rim.chunks_mut(lanes));
         let all = vectors.zip(numbers).zip(flags).zip(curvatures);
         all.map(|((((normals, shapes), numbers), (is_known, is_at_rim)), curvatures)| {
-            let ((heights, height_deviations), normal_deviations) = numbers;
-            Slots {
-                normals,
-                shapes,
-                heights,
-                height_deviations,
-                normal_deviations,
-                is_known,
-                is_at_rim,
-                curvatures,
-            }
+            let ((heights, height_std), normal_std) = numbers;
+            Slots { normals, shapes, heights, height_std, normal_std, is_known, is_at_rim, curvatures }
         })
         .collect()
     }
@@ -129,8 +120,8 @@ struct Slots<'a> {
     normals: &'a mut [f64],
     shapes: &'a mut [f64],
     heights: &'a mut [f64],
-    height_deviations: &'a mut [f64],
-    normal_deviations: &'a mut [f64],
+    height_std: &'a mut [f64],
+    normal_std: &'a mut [f64],
     is_known: &'a mut [bool],
     is_at_rim: &'a mut [bool],
     curvatures: Option<CurvatureSlots<'a>>,
@@ -154,8 +145,8 @@ impl Slots<'_> {
         self.normals[lane * d..][..d].copy_from_slice(&normal);
         self.shapes[lane * d * d..][..d * d].copy_from_slice(&shape);
         self.heights[lane] = -estimate.means[0] * place.radius;
-        self.height_deviations[lane] = estimate.covariance[0].max(0.0).sqrt() * place.radius;
-        self.normal_deviations[lane] = estimate.normal_deviation(d, is_point);
+        self.height_std[lane] = estimate.covariance[0].max(0.0).sqrt() * place.radius;
+        self.normal_std[lane] = estimate.normal_deviation(d, is_point);
         if let Some(curvatures) = &mut self.curvatures {
             let found = estimate.curvatures(d, is_point);
             let principal = curvatures.principal[lane * k..][..k].iter_mut();

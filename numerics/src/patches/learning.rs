@@ -266,7 +266,7 @@ fn deviations(found: &PatchGeometry, dimension: usize) -> Vec<f64> {
 /// Returns the geometric mean of the deviations of normal and curvature at each site.
 fn uncertainties(found: &PatchGeometry, dimension: usize) -> Vec<f64> {
     let curvatures = deviations(found, dimension);
-    curvatures.iter().zip(&found.normal_deviations).map(|(a, b)| (a * b).sqrt()).collect()
+    curvatures.iter().zip(&found.normal_std).map(|(a, b)| (a * b).sqrt()).collect()
 }
 
 /// Median ratio of deviations at the same sites, infinite where none is finite.

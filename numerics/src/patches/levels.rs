@@ -125,7 +125,7 @@ impl Difference {
         let [a, c] = [fine, coarse].map(|of| &of.normals[at * dimension..][..dimension]);
         let sign = if dot(a, c) < 0.0 { -1.0 } else { 1.0 };
         let square: f64 = a.iter().zip(c).map(|(a, c)| (a - sign * c).powi(2)).sum();
-        let variances = [fine, coarse].map(|of| normal_variance(of.normal_deviations[at], k));
+        let variances = [fine, coarse].map(|of| normal_variance(of.normal_std[at], k));
         let [mean_a, mean_c] = [fine, coarse].map(|of| mean_curvature(of, at, dimension));
         let of_means = [fine, coarse].map(|of| deviations(of).map_or(0.0, |own| own.mean[at].powi(2)));
         Self {
@@ -186,8 +186,8 @@ impl PatchGeometry {
         own.iter_mut().for_each(|c| *c /= length);
         let apart = self.heights[at] - sign * coarse.heights[at];
         self.heights[at] = sign * coarse.heights[at] + weight.mean * apart;
-        mix(&mut self.height_deviations[at], coarse.height_deviations[at], apart * apart, weight);
-        mix(&mut self.normal_deviations[at], coarse.normal_deviations[at], square, weight);
+        mix(&mut self.height_std[at], coarse.height_std[at], apart * apart, weight);
+        mix(&mut self.normal_std[at], coarse.normal_std[at], square, weight);
     }
 
     fn refine_curvatures(&mut self, coarse: &Self, Place { at, dimension: d, sign }: Place, weight: Weight) {
@@ -231,7 +231,7 @@ mod tests {
         PatchGeometry {
             is_known: vec![true; n],
             normals: angles.iter().flat_map(|a| [a.sin(), a.cos()]).collect(),
-            normal_deviations: vec![deviation; n],
+            normal_std: vec![deviation; n],
             ..PatchGeometry::unknown(n, 2, false)
         }
     }
@@ -252,8 +252,8 @@ mod tests {
     /// Share of the angles that lie within 1.96 deviations, and median deviation.
     fn covered(of: &PatchGeometry) -> (f64, f64) {
         let angles = of.normals.chunks_exact(2).map(|normal| normal[0].asin().abs());
-        let n_within = angles.zip(&of.normal_deviations).filter(|(a, bar)| *a <= 1.96 * **bar).count();
-        (n_within as f64 / of.is_known.len() as f64, median(of.normal_deviations.clone()).unwrap())
+        let n_within = angles.zip(&of.normal_std).filter(|(a, bar)| *a <= 1.96 * **bar).count();
+        (n_within as f64 / of.is_known.len() as f64, median(of.normal_std.clone()).unwrap())
     }
 
     #[test]
@@ -294,6 +294,6 @@ mod tests {
             Agreement { normals: vec![1.0 / 9.0; N_BIASES], curvatures: vec![1.0 / 9.0; N_BIASES] };
         fine.refine(&coarse, &agreement, 2);
         assert!(fine.is_known[0] && (fine.normals[0] - 0.3f64.sin()).abs() < 1e-15);
-        assert!((fine.normal_deviations[0] - 0.02).abs() < 1e-15);
+        assert!((fine.normal_std[0] - 0.02).abs() < 1e-15);
     }
 }

@@ -75,7 +75,7 @@ impl Level {
             let bend: f64 = (0..d).map(|a| arm[a] * dot(&shape[a * d..][..d], &arm)).sum();
             sums.add(&along, dot(normal, &arm) + 0.5 * bend);
         }
-        let own = normal_variance(surface.normal_deviations[at], k);
+        let own = normal_variance(surface.normal_std[at], k);
         sums.fit(own)
     }
 }
@@ -179,7 +179,7 @@ mod tests {
                 is_known: vec![true; cloud.n_points()],
                 normals: cloud.points().flat_map(|_| [f64::sin(angle), 0.0, f64::cos(angle)]).collect(),
                 heights: cloud.points().map(|x| x[2]).collect(),
-                normal_deviations: vec![deviation; cloud.n_points()],
+                normal_std: vec![deviation; cloud.n_points()],
                 ..PatchGeometry::unknown(cloud.n_points(), 3, false)
             };
             assert_eq!(level.has_slopes_over(&plane, &cloud, noise), has_slopes, "{angle}, {deviation}");

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::Surface;
 use super::curvature::{principal_curvatures, tangential_trace};
-use super::degeneracy::{Degeneracy, DegeneracyReason, Resolution, is_far};
+use super::flags::{Flag, FlagReason, Resolution, is_far};
 pub use super::request::{GeometryRequest, Orientation, SurfaceModel};
 use super::served::{Deviations, Edge, Served, ServedBy};
 use crate::error::{NumericsError, Result};
@@ -23,7 +23,7 @@ pub struct Geometry {
     /// `[m, d]`, norm 1.
     normals: Vec<f64>,
     is_null: Vec<bool>,
-    degenerate: Vec<Degeneracy>,
+    flags: Vec<Flag>,
 }
 
 /// Curvatures at m queries, in the order of the queries. Entries of null queries are zero and meaningless.
@@ -53,11 +53,11 @@ impl Geometry {
         let (m, d) = (queries.n_points(), queries.dimension());
         let gradient_norms: Vec<f64> = (0..m).map(|query| norm(served.gradient(query))).collect();
         let mut normals = vec![0.0; m * d];
-        let mut degenerate = Vec::new();
+        let mut flags = Vec::new();
         for (query, normal) in normals.chunks_exact_mut(d).enumerate() {
             let (verdict, gradient_norm) = (served.verdict(query), gradient_norms[query]);
             if let Some(reason) = verdict.reason {
-                degenerate.push(Degeneracy { query, reason, gradient_norm });
+                flags.push(Flag { query, reason, gradient_norm });
             }
             if !verdict.is_null() {
                 // Adding 0 turns −0 into 0.
@@ -66,7 +66,7 @@ impl Geometry {
             }
         }
         let is_null = (0..m).map(|query| served.verdict(query).is_null()).collect();
-        Ok(Self { served, gradient_norms, normals, is_null, degenerate })
+        Ok(Self { served, gradient_norms, normals, is_null, flags })
     }
 
     pub fn n_queries(&self) -> usize {
@@ -83,8 +83,8 @@ impl Geometry {
     }
 
     /// The queries without answer or with a flag, ascending.
-    pub fn degenerate(&self) -> &[Degeneracy] {
-        &self.degenerate
+    pub fn flags(&self) -> &[Flag] {
+        &self.flags
     }
 
     /// Flags queries around which nodes do not resolve the surface. Queries with too few nodes become null.
@@ -92,7 +92,7 @@ impl Geometry {
         let all = || resolutions.iter().enumerate();
         let unresolved = all().filter(|(_, resolution)| **resolution != Resolution::Resolved);
         let unresolved: Vec<usize> = unresolved.map(|(query, _)| query).collect();
-        self.flag(&unresolved, DegeneracyReason::UnderResolved);
+        self.flag(&unresolved, FlagReason::UnderResolved);
         for (query, _) in all().filter(|(_, resolution)| **resolution == Resolution::Empty) {
             self.is_null[query] = true;
         }
@@ -107,20 +107,20 @@ impl Geometry {
             nearest.first().is_none_or(|found| is_far(found.squared_distance, nodes.spacing(found.point)))
         };
         let far: Vec<usize> = (0..self.n_queries()).into_par_iter().filter(is_far).collect();
-        self.flag(&far, DegeneracyReason::FarFromCloud);
+        self.flag(&far, FlagReason::FarFromCloud);
     }
 
     /// Flags queries that are not flagged yet.
-    fn flag(&mut self, queries: &[usize], reason: DegeneracyReason) {
-        let n_flagged = self.degenerate.len();
+    fn flag(&mut self, queries: &[usize], reason: FlagReason) {
+        let n_flagged = self.flags.len();
         for &query in queries {
-            let flagged = &self.degenerate[..n_flagged];
+            let flagged = &self.flags[..n_flagged];
             if flagged.binary_search_by_key(&query, |entry| entry.query).is_err() {
                 let gradient_norm = self.gradient_norms[query];
-                self.degenerate.push(Degeneracy { query, reason, gradient_norm });
+                self.flags.push(Flag { query, reason, gradient_norm });
             }
         }
-        self.degenerate.sort_by_key(|entry| entry.query);
+        self.flags.sort_by_key(|entry| entry.query);
     }
 
     /// Magnitude of the largest principal curvature at a query with an answer, 1/L.
@@ -235,7 +235,7 @@ mod tests {
             let surface = Surface::of(signature, None, &Unobserved).unwrap();
             // Without the offset model, which would confirm as well.
             let request = GeometryRequest { max_offsets: 0, ..GeometryRequest::CURVATURES };
-            Geometry::of(&surface, &cloud, &request, &Unobserved).unwrap().degenerate.len()
+            Geometry::of(&surface, &cloud, &request, &Unobserved).unwrap().flags.len()
         };
         // Quadrics over 0.53 of the radius are off by 8 %. A wide kernel predicts the points that are left
         // out, a narrow one predicts none.
@@ -262,7 +262,7 @@ mod tests {
         let cloud = fibonacci_sphere(256);
         let geometry = geometry(&cloud, 1.0, &cloud, Orientation::Outward);
         let curvatures = geometry.curvatures(&Unobserved).unwrap();
-        assert!(geometry.degenerate().is_empty());
+        assert!(geometry.flags().is_empty());
         for query in 0..256 {
             assert!(dot(geometry.normal(query), cloud.point(query)) > 1.0 - 1e-6);
             assert!((geometry.trace_of_shape_operator(query) - 2.0 * curvatures.mean[query]).abs() < 1e-12);
@@ -306,7 +306,7 @@ mod tests {
         let queries = Cloud::new(vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0], 3).unwrap();
         let geometry = geometry(&cloud, 1.0, &queries, Orientation::Outward);
         assert_eq!(geometry.is_null(), [true, false]);
-        assert_eq!(geometry.degenerate()[0].query, 0);
-        assert_eq!(geometry.degenerate()[0].gradient_norm, geometry.gradient_norms()[0]);
+        assert_eq!(geometry.flags()[0].query, 0);
+        assert_eq!(geometry.flags()[0].gradient_norm, geometry.gradient_norms()[0]);
     }
 }

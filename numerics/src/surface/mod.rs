@@ -1,6 +1,6 @@
 //! The surface that a cloud samples: the level surface of a function, or local regressions.
 
-pub mod degeneracy;
+pub mod flags;
 pub mod geometry;
 pub mod local;
 pub mod price;

@@ -18,7 +18,7 @@ pub enum SurfaceModel {
     Signature,
     Offset,
     /// Local regressions.
-    Local,
+    Regression,
 }
 
 /// Options of a request for geometry.

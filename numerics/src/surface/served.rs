@@ -1,13 +1,13 @@
 //! Geometry served at queries, whichever model it comes from.
 
-use super::degeneracy::DegeneracyReason;
+use super::flags::FlagReason;
 
 /// The model that serves a query.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ServedBy {
     Signature,
     Offset,
-    Local,
+    Regression,
 }
 
 /// Standard deviations at m queries, in flat arrays, in the order of the quantities they belong to. Zero at
@@ -51,18 +51,18 @@ pub(crate) struct Served {
     pub(super) edges: Vec<Edge>,
 }
 
-/// Sign, model and degeneracy of a query.
+/// Sign, model and flag of a query.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Verdict {
     /// Sign of ν against ∇u: +1 or −1.
     pub sign: f64,
     pub by: ServedBy,
-    pub reason: Option<DegeneracyReason>,
+    pub reason: Option<FlagReason>,
 }
 
 impl Verdict {
     pub(crate) fn is_null(self) -> bool {
-        self.reason.is_some_and(DegeneracyReason::is_null)
+        self.reason.is_some_and(FlagReason::is_null)
     }
 }
 

@@ -7,7 +7,7 @@ use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::surface::Surface;
-use gramian_numerics::surface::degeneracy::DegeneracyReason;
+use gramian_numerics::surface::flags::FlagReason;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, Orientation};
 use gramian_numerics::surface::local::{Given, LocalSurface};
 
@@ -204,9 +204,9 @@ fn normals(cloud: &Arc<Cloud>, orientation: Orientation) -> Geometry {
     Geometry::of(&Surface::from(local), cloud, &request, &Unobserved).unwrap()
 }
 
-fn reasons(geometry: &Geometry) -> Vec<Option<DegeneracyReason>> {
+fn reasons(geometry: &Geometry) -> Vec<Option<FlagReason>> {
     let mut reasons = vec![None; geometry.n_queries()];
-    geometry.degenerate().iter().for_each(|flag| reasons[flag.query] = Some(flag.reason));
+    geometry.flags().iter().for_each(|flag| reasons[flag.query] = Some(flag.reason));
     reasons
 }
 
@@ -236,7 +236,7 @@ fn points_on_the_edges_of_an_exact_cube_have_two_normals() {
                 2 => {
                     n_edges += 1;
                     let Some(edge) = edge else { continue };
-                    n_found += usize::from(reasons[query] == Some(DegeneracyReason::Edge));
+                    n_found += usize::from(reasons[query] == Some(FlagReason::Edge));
                     let sum = |c: usize| edge.normals[c] + edge.normals[3 + c];
                     let off = (0..3).map(|c| (sum(c) - sign * x[c].trunc()).abs()).fold(0.0, f64::max);
                     assert!(off < 1e-6, "{x:?}: {:?}", edge.normals);

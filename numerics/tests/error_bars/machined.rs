@@ -80,7 +80,7 @@ pub fn rounded_box_answered(n: usize, noise: f64) -> Answered {
     let mean = found.curvatures(&Unobserved).unwrap().mean;
     let deviations = &found.deviations().unwrap().mean;
     let mut flagged = vec![false; n];
-    found.degenerate().iter().for_each(|flag| flagged[flag.query] = true);
+    found.flags().iter().for_each(|flag| flagged[flag.query] = true);
     let is_covered =
         |at: &usize| (mean[*at] - MEAN_CURVATURES[points[*at].part]).abs() <= 1.96 * deviations[*at] + 1e-9;
     let covered = [0, 1, 2].map(|part| {
@@ -119,7 +119,7 @@ fn planes_with_much_noise_have_no_flag() {
         let mut random = Random(2);
         let points: Vec<[f64; 3]> = (0..n).map(|_| [random.uniform(), random.uniform(), 0.0]).collect();
         let spacing = (1.0 / n as f64).sqrt();
-        let n_flagged = curvatures(points.into_iter(), noise * spacing, &mut random).degenerate().len();
+        let n_flagged = curvatures(points.into_iter(), noise * spacing, &mut random).flags().len();
         assert!(20 * n_flagged <= n, "{noise}: {n_flagged}");
     }
 }

@@ -82,7 +82,7 @@ impl Row {
                 curvatures = [-curvatures[1], -curvatures[0]];
                 bars.reverse();
             }
-            let bars = [found.normal_deviations[i], deviations.mean[i], bars[0], bars[1]];
+            let bars = [found.normal_std[i], deviations.mean[i], bars[0], bars[1]];
             if !deviations.is_bent[i] {
                 ratios[i] = larger(curvatures) / bars[2].max(bars[3]);
             }

@@ -26,7 +26,7 @@ fn is_finite(found: &PatchGeometry) -> bool {
         &found.normals,
         &found.shapes,
         &found.heights,
-        &found.normal_deviations,
+        &found.normal_std,
         &deviations.principal,
         &deviations.mean,
         &deviations.gaussian,
@@ -151,6 +151,6 @@ fn answers_do_not_depend_on_threads_or_company() {
     };
     let ((one, alone), (three, _)) = (on(1), on(3));
     assert_eq!(one.shapes, three.shapes);
-    assert_eq!(one.normal_deviations, three.normal_deviations);
+    assert_eq!(one.normal_std, three.normal_std);
     assert_eq!(alone.shapes, one.shapes[17 * 9..18 * 9]);
 }

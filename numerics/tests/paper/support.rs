@@ -115,7 +115,7 @@ impl Function<'_> {
     /// Surface gradients ∇_M f, `[m, d]`, and Laplace–Beltrami Δ_M f, `[m]`.
     pub fn surface_derivatives(&self, queries: &Cloud) -> (Vec<f64>, Vec<f64>) {
         let geometry = self.surface.geometry(queries, Orientation::Outward);
-        assert!(geometry.degenerate().is_empty());
+        assert!(geometry.flags().is_empty());
         let gradients =
             operators::Operator::SurfaceGradient.apply(&geometry, &self.interpolant, queries, &Unobserved);
         let laplacians =

@@ -86,7 +86,7 @@ fn have_equal_deviations(a: &JetDeviations, b: &JetDeviations, family: Family) {
     let gradients: Vec<f64> = b.gradients.iter().enumerate().map(|(at, g)| g * first(at)).collect();
     let second = |at: usize| FACTORS[at / 3 % 3] * FACTORS[at % 3];
     let hessians: Vec<f64> = b.hessians.iter().enumerate().map(|(at, h)| h * second(at)).collect();
-    are_equal(&a.values, &b.values, family, "deviations");
+    are_equal(&a.values, &b.values, family, "std");
     are_equal(&a.gradients, &gradients, family, "deviations of gradients");
     are_equal(&a.hessians, &hessians, family, "deviations of Hessians");
 }

@@ -66,7 +66,7 @@ fn regressions_change_by_rounding_alone() {
         for i in 0..n {
             let j = place(i, n);
             let curvatures = (x.mean[i] - y.mean[j]).abs() / greatest;
-            let deviations = (a.normal_deviations[i] - b.normal_deviations[j]).abs();
+            let deviations = (a.normal_std[i] - b.normal_std[j]).abs();
             assert!(curvatures < 1e-9 && deviations < 1e-9, "{n}, {d}: {curvatures} {deviations}");
         }
     }
@@ -119,7 +119,7 @@ fn parts_with_the_hyperparameters_of_the_whole_have_its_surface() {
     let (a, b) = (at_queries(&of_whole), at_queries(&of_part));
     // Normals have either sign. Neighbours are the same, so what differs is the order of sums.
     let is_close = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(x, y)| (x.abs() - y.abs()).abs() < 1e-9);
-    assert!(is_close(&a.normals, &b.normals) && is_close(&a.normal_deviations, &b.normal_deviations));
+    assert!(is_close(&a.normals, &b.normals) && is_close(&a.normal_std, &b.normal_std));
     assert!(is_close(&a.shapes, &b.shapes));
 }
 

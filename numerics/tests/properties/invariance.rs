@@ -70,7 +70,7 @@ impl Similarity {
 struct Answers {
     /// Relative rounding of the fit, n ε cond.
     rounding: f64,
-    degenerate: Vec<bool>,
+    is_null: Vec<bool>,
     fields: Vec<(&'static str, Vec<f64>)>,
 }
 
@@ -93,7 +93,7 @@ fn answers(cloud: &Cloud, values: &[f64], queries: &Cloud, kernel: Kernel, alpha
             Operator::LaplaceBeltrami.matrix(&geometry, &factor, queries, Mean::Zero, &Unobserved).unwrap(),
         ),
     ];
-    Answers { rounding: rounding(&factor), degenerate: geometry.is_null().to_vec(), fields }
+    Answers { rounding: rounding(&factor), is_null: geometry.is_null().to_vec(), fields }
 }
 
 /// Shape operators `Σ κ_i d_i d_iᵀ`, `[m, d, d]`. Unlike directions they have no
@@ -141,9 +141,9 @@ fn check(cloud: &Cloud, queries: &Cloud, by: &Similarity, allowed: impl Fn(f64) 
         let original = answers(cloud, &values, queries, kernel(1.0), 1e-5);
         let (cloud, values) = (reordered(&by.image(cloud), &by.order), by.reorder(&values));
         let image = answers(&cloud, &values, &by.image(queries), kernel(by.scale), 1e-5);
-        assert_eq!(original.degenerate, image.degenerate, "{family:?}");
-        let n_degenerate = image.degenerate.iter().filter(|&&is| is).count();
-        assert!(3 * n_degenerate <= image.degenerate.len(), "{family:?}: {n_degenerate} degenerate");
+        assert_eq!(original.is_null, image.is_null, "{family:?}");
+        let n_null = image.is_null.iter().filter(|&&is| is).count();
+        assert!(3 * n_null <= image.is_null.len(), "{family:?}: {n_null} null");
         for ((name, before), (_, after)) in original.fields.iter().zip(&image.fields) {
             let expected = carried(name, before, by);
             let scale = largest(expected.iter().copied());

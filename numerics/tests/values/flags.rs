@@ -200,7 +200,7 @@ impl Counts {
         let m = geometry.n_queries();
         let k = found.len() / m;
         let mut is_flagged = geometry.is_null().to_vec();
-        geometry.degenerate().iter().for_each(|entry| is_flagged[entry.query] = true);
+        geometry.flags().iter().for_each(|entry| is_flagged[entry.query] = true);
         doubts.iter().for_each(|&query| is_flagged[query] = true);
         let mean_square = exact.iter().map(|t| t * t).sum::<f64>() / m as f64;
         for query in 0..m {

@@ -77,7 +77,7 @@ impl Case {
         let surface =
             Surface::from(LocalSurface::of(cloud, sampling, Given::default(), &Unobserved).unwrap());
         let request = GeometryRequest {
-            model: SurfaceModel::Local,
+            model: SurfaceModel::Regression,
             has_deviations: true,
             ..GeometryRequest::CURVATURES
         };

@@ -116,7 +116,7 @@ impl Case {
         let local = LocalSurface::of(cloud.clone(), sampling, Given::default(), &Unobserved).unwrap();
         let surface = Surface::from(local);
         let request = GeometryRequest {
-            model: SurfaceModel::Local,
+            model: SurfaceModel::Regression,
             has_deviations: true,
             ..GeometryRequest::CURVATURES
         };

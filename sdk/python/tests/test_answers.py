@@ -16,7 +16,7 @@ import pytest
 from sent import CIRCLE, METHODS, OPERATORS, QUERYING, VALUES
 
 import gramian
-from gramian import Geometry, Kernel
+from gramian import Surface, Kernel
 from gramian.answers import Answer
 from gramian.answers.files import replace_file
 from gramian.answers.fit import operator_fit_used, surface_fit_used
@@ -43,7 +43,7 @@ FITS: dict[str, dict[str, Any]] = {
 }
 GEOMETRIES: dict[str, dict[str, Any]] = {
     "kernel": {"kernel": Kernel("gauss", length_scale=2)},
-    "alpha": {"kernel": "gauss", "alpha": 1e-6, "surface": "signature"},
+    "alpha": {"kernel": "gauss", "alpha": 1e-6, "surface_model": "signature"},
     "length scales": {"kernel": Kernel("gauss", length_scales=[2, 1 / 3]), "alpha": 1e-8},
     "noise": {"noise_variances": NOISE},
 }
@@ -88,20 +88,20 @@ def test_the_fit_of_an_answer_repeats_it(cloud: Any, method: str, fit: dict[str,
 
 
 @every_operator
-@pytest.mark.parametrize("geometry", GEOMETRIES.values(), ids=GEOMETRIES.keys())
+@pytest.mark.parametrize("surface", GEOMETRIES.values(), ids=GEOMETRIES.keys())
 @pytest.mark.parametrize("fit", [{}, FITS["noise"], FITS["kernel"]], ids=["nothing", "noise", "kernel"])
 def test_so_it_does_with_a_geometry(cloud: Any, method: str, fit: dict[str, Any], geometry: dict[str, Any]) -> None:
-    answer = ask(cloud, method, **fit, geometry=geometry)
-    assert_same(answer, ask(cloud, method, **fit, geometry=Geometry(**geometry)))
+    answer = ask(cloud, method, **fit, surface=geometry)
+    assert_same(answer, ask(cloud, method, **fit, surface=Surface(**geometry)))
     assert_same(answer, ask(cloud, method, **answer.fit))
 
 
 @every_operator
 def test_so_it_does_with_a_geometry_of_another_cloud(cloud: Any, method: str) -> None:
     other = gramian.Client().cloud(1.5 * CIRCLE[:7])
-    for geometry in [other, Geometry(cloud=other, kernel="gauss", noise_variances=NOISE[:7])]:
-        answer = ask(cloud, method, geometry=geometry)
-        assert (answer.diagnostics.geometry or answer.diagnostics).cloud_id == other.id
+    for geometry in [other, Surface(cloud=other, kernel="gauss", noise_variances=NOISE[:7])]:
+        answer = ask(cloud, method, surface=geometry)
+        assert (answer.diagnostics.surface or answer.diagnostics).cloud_id == other.id
         again = pickle.loads(pickle.dumps(answer.fit))
         assert_same(answer, ask(cloud, method, **again))
 
@@ -111,7 +111,7 @@ def test_so_it_does_with_a_geometry_of_another_cloud(cloud: Any, method: str) ->
 def test_a_forgotten_cloud_of_a_geometry_is_posted_again(cloud: Any, method: str, as_mapping: bool) -> None:
     other = gramian.Client().cloud(1.75 * CIRCLE)
     httpx.delete(f"{os.environ['GRAMIAN_URL']}/v1/clouds/{other.id}").raise_for_status()
-    ask(cloud, method, geometry={"cloud": other} if as_mapping else other)
+    ask(cloud, method, surface={"cloud": other} if as_mapping else other)
 
 
 # A cloud for local solvers, for which eight points are too few.
@@ -121,24 +121,24 @@ MANY = 1.5 * np.column_stack([np.cos(np.arange(40) * np.pi / 20), np.sin(np.aran
 @pytest.mark.parametrize("method", [*OPERATORS, "normals", "curvatures"])
 def test_so_it_does_where_nothing_but_neighbours_is_fitted(method: str) -> None:
     cloud = gramian.Client().cloud(MANY)
-    said: list[dict[str, Any]] = [{"geometry": {"surface": "local"}}, {"geometry": {"solver": "local"}}]
+    said: list[dict[str, Any]] = [{"surface": {"model": "regression"}}, {"surface": {"solver": "local"}}]
     if method not in OPERATORS:
-        said = [{"surface": "local"}, {"solver": "local"}]
+        said = [{"surface_model": "regression"}, {"solver": "local"}]
     elif not method.endswith("_matrix") or "sparse" in method:
         said += [
             {"solver": "local"},
-            {"solver": "local", "geometry": {"solver": "dense", "kernel": "gauss", "alpha": 1e-8}},
+            {"solver": "local", "surface": {"solver": "dense", "kernel": "gauss", "alpha": 1e-8}},
         ]
-        said += [{"solver": "local", "geometry": {"cloud": gramian.Client().cloud(1.01 * MANY), "surface": "local"}}]
+        said += [{"solver": "local", "surface": {"cloud": gramian.Client().cloud(1.01 * MANY), "surface_model": "regression"}}]
     given = {"values": MANY[:, 0]} if "values" in METHODS[method] else {}
     for arguments in said:
         answer = getattr(cloud, method)(**given, queries=MANY[:3], **arguments)
         again = getattr(cloud, method)(**given, queries=MANY[:3], **pickle.loads(pickle.dumps(answer)).fit)
         assert_same(answer, again)
         if method in OPERATORS:
-            surface = answer.diagnostics.geometry or answer.diagnostics
+            surface = answer.diagnostics.surface or answer.diagnostics
             solver = {"solver": arguments["solver"]} if "solver" in arguments else {}
-            again = getattr(cloud, method)(**given, queries=MANY[:3], geometry=surface, **solver)
+            again = getattr(cloud, method)(**given, queries=MANY[:3], surface=surface, **solver)
             assert again.diagnostics.to_dict() == answer.diagnostics.to_dict()
 
 
@@ -147,7 +147,7 @@ def test_the_diagnostics_of_an_answer_can_be_sent_back(cloud: Any, method: str) 
     answer = ask(cloud, method, kernel="matern", alpha=1e-4)
     said = answer.diagnostics
     # Sparse matrices have only the fit of the surface.
-    geometry = {"geometry": said.geometry or said} if method in OPERATORS else {}
+    geometry = {"surface": said.surface or said} if method in OPERATORS else {}
     again = ask(cloud, method, kernel=said.kernel, alpha=said.alpha, solver=said.solver, **geometry)
     assert again.diagnostics.to_dict() == said.to_dict()
 
@@ -155,12 +155,12 @@ def test_the_diagnostics_of_an_answer_can_be_sent_back(cloud: Any, method: str) 
 @every_operator
 def test_the_diagnostics_of_a_fit_with_noise_do_not_say_all(cloud: Any, method: str) -> None:
     said = ask(cloud, method, noise_variances=NOISE).diagnostics
-    surface = said.geometry or said
-    with pytest.raises(ValueError, match=r"^geometry.alpha is absent from these diagnostics"):
-        ask(cloud, method, geometry=surface)
-    for geometry in [Geometry(alpha=surface.alpha), {"alpha": surface.alpha}]:
-        with pytest.raises(ValueError, match=r"^geometry.alpha is absent from these diagnostics"):
-            ask(cloud, method, geometry=geometry)
+    surface = said.surface or said
+    with pytest.raises(ValueError, match=r"^surface.alpha is absent from these diagnostics"):
+        ask(cloud, method, surface=surface)
+    for geometry in [Surface(alpha=surface.alpha), {"alpha": surface.alpha}]:
+        with pytest.raises(ValueError, match=r"^surface.alpha is absent from these diagnostics"):
+            ask(cloud, method, surface=geometry)
     with pytest.raises(ValueError, match=r"^alpha is absent from these diagnostics"):
         ask(cloud, method, kernel=said.kernel, alpha=said.alpha)
 
@@ -204,7 +204,7 @@ def test_the_fit_of_a_selection_is_what_was_selected(cloud: Any, fit: dict[str, 
 
 def test_the_noise_of_a_fit_stays_what_was_sent(cloud: Any) -> None:
     noise = NOISE.copy()
-    answer = cloud.posterior(VALUES, noise_variances=noise, include="variance")
+    answer = cloud.posterior(VALUES, noise_variances=noise, include="variances")
     noise[:] = 7
     np.testing.assert_array_equal(answer.fit["noise_variances"], NOISE)
 
@@ -240,8 +240,8 @@ def test_representations_are_as_one_writes_them(cloud: Any) -> None:
         Kernel("gauss", length_scales=range(1, 9)),
     ]:
         assert eval(repr(written), {"Kernel": Kernel}) == written
-    assert repr(Geometry(cloud=cloud, kernel=Kernel("wendland", smoothness=4), noise_variances=NOISE)) == (
-        f"Geometry(cloud=Cloud(id='{cloud.id[:8]}…', n_points=8, dimension=2), "
+    assert repr(Surface(cloud=cloud, kernel=Kernel("wendland", smoothness=4), noise_variances=NOISE)) == (
+        f"Surface(cloud=Cloud(id='{cloud.id[:8]}…', n_points=8, dimension=2), "
         "kernel=Kernel(family='wendland', smoothness=4), noise_variances=array[8])"
     )
     assert repr(gramian.rest.models.Kernel(family=gramian.KernelFamily.GAUSS)) == "Kernel(family='gauss')"

@@ -18,7 +18,7 @@ import pytest
 from sent import BATCHES, CIRCLE, LISTS, METHODS, OPERATORS, QUERYING, SURFACES, VALUES, client, cloud, posted, sent
 
 import gramian
-from gramian import Geometry, Kernel, KernelFamily, SolverChoice, SolverUsed
+from gramian import Surface, Kernel, KernelFamily, SolverChoice, SolverUsed
 from gramian.rest import models
 from gramian.rest.types import UNSET
 
@@ -87,9 +87,9 @@ def test_numbers_of_all_kinds_are_numbers(method: str, half: object) -> None:
 @pytest.mark.parametrize("half", HALVES, ids=repr)
 def test_so_they_are_in_a_geometry(method: str, half: SupportsFloat) -> None:
     kernel = Kernel("gauss", length_scale=half)
-    body = sent(method, geometry=Geometry(alpha=half, kernel=kernel))
-    assert body["geometry"] == {"alpha": 0.5, "kernel": {"family": "gauss", "length_scale": 0.5}}
-    assert body == sent(method, geometry={"alpha": half, "kernel": kernel})
+    body = sent(method, surface=Surface(alpha=half, kernel=kernel))
+    assert body["surface"] == {"alpha": 0.5, "kernel": {"family": "gauss", "length_scale": 0.5}}
+    assert body == sent(method, surface={"alpha": half, "kernel": kernel})
 
 
 @every_method
@@ -148,12 +148,12 @@ def test_other_things_than_numbers_are_refused_by_name(
         with pytest.raises(kind, match=rf"^{nested}"):
             Kernel("gauss", **{parameter: alpha})  # type: ignore[arg-type]
     if method in OPERATORS:
-        nested = message.replace("alpha", "geometry.alpha")
+        nested = message.replace("alpha", "surface.alpha")
         with pytest.raises(kind, match=rf"^{nested}"):
-            getattr(cloud(), method)(**METHODS[method], geometry=Geometry(alpha=alpha))  # type: ignore[arg-type]
-        nested = message.replace("alpha", "geometry.kernel.nu")
+            getattr(cloud(), method)(**METHODS[method], surface=Surface(alpha=alpha))  # type: ignore[arg-type]
+        nested = message.replace("alpha", "surface.kernel.nu")
         with pytest.raises(kind, match=rf"^{nested}"):
-            getattr(cloud(), method)(**METHODS[method], geometry={"kernel": {"family": "matern", "nu": alpha}})
+            getattr(cloud(), method)(**METHODS[method], surface={"kernel": {"family": "matern", "nu": alpha}})
 
 
 def test_a_fraction_is_no_whole_number() -> None:
@@ -191,8 +191,8 @@ def test_arrays_of_all_kinds_are_arrays(method: str, values: npt.ArrayLike) -> N
     elif "values" in METHODS[method]:
         assert sent(method, values=values)["values"] == VALUES.tolist()
     if method in OPERATORS:
-        body = sent(method, geometry=Geometry(noise_variances=values))
-        assert body["geometry"] == {"noise_variances": VALUES.tolist()}
+        body = sent(method, surface=Surface(noise_variances=values))
+        assert body["surface"] == {"noise_variances": VALUES.tolist()}
 
 
 ROWS: dict[str, Any] = {
@@ -323,8 +323,8 @@ def test_values_are_refused_by_name_and_place(method: str) -> None:
     with pytest.raises(ValueError, match=rf"^noise_variances{message}"):
         sent(method, noise_variances=bad)
     if method in OPERATORS:
-        with pytest.raises(ValueError, match=rf"^geometry.noise_variances{message}"):
-            sent(method, geometry={"noise_variances": bad})
+        with pytest.raises(ValueError, match=rf"^surface.noise_variances{message}"):
+            sent(method, surface={"noise_variances": bad})
 
 
 # Shapes
@@ -419,15 +419,15 @@ def test_normals_have_the_shape_of_the_points() -> None:
 
 SOLVERS = ["dense", np.str_("dense"), np.array("dense"), SolverChoice.DENSE, SolverUsed.DENSE]
 QUANTITIES = [
-    "variance",
+    "variances",
     gramian.PosteriorQuantity.VARIANCE,
-    np.array("variance"),
-    ["variance"],
-    ("variance",),
-    {"variance"},
-    {"variance": 1}.keys(),
-    iter(["variance"]),
-    np.array(["variance"]),
+    np.array("variances"),
+    ["variances"],
+    ("variances",),
+    {"variances"},
+    {"variances": 1}.keys(),
+    iter(["variances"]),
+    np.array(["variances"]),
     [gramian.PosteriorQuantity.VARIANCE],
 ]
 
@@ -445,30 +445,30 @@ def test_words_may_be_strings_or_members_of_enumerations(method: str) -> None:
     for merge in ["merge", gramian.DuplicatePolicy.MERGE, Spelling.MERGE]:
         assert sent(method, duplicates=merge)["duplicates"] == "merge"
     if method in ["normals", "curvatures"]:
-        for surface in ["offset", gramian.SurfaceChoice.OFFSET, gramian.SurfaceUsed.OFFSET]:
-            assert sent(method, surface=surface)["surface"] == "offset"
+        for surface in ["offset", gramian.SurfaceModelChoice.OFFSET, gramian.SurfaceModelUsed.OFFSET]:
+            assert sent(method, surface=surface)["surface_model"] == "offset"
         for orientation in ["gradient", gramian.OrientationChoice.GRADIENT]:
             assert sent(method, orientation=orientation)["orientation"] == "gradient"
 
 
 @pytest.mark.parametrize("method", ["normals", "curvatures", "interpolate", "interpolate_batch"])
 def test_deviations_may_be_asked_for_by_their_own_name(method: str) -> None:
-    wanted = {"include": ["deviations"]}
+    wanted = {"include": ["std"]}
     said: list[dict[str, Any]] = [
-        {"deviations": True},
-        {"deviations": np.True_},
-        {"deviations": True, "include": []},
-        {"deviations": True, "include": "deviations"},
-        {"include": "deviations"},
-        {"include": [gramian.GeometryInclude.DEVIATIONS], "deviations": False},
+        {"std": True},
+        {"std": np.True_},
+        {"std": True, "include": []},
+        {"std": True, "include": "std"},
+        {"include": "std"},
+        {"include": [gramian.GeometryInclude.DEVIATIONS], "std": False},
     ]
     for arguments in said:
         assert sent(method, **arguments) == sent(method) | wanted
     for absent in [None, UNSET, False]:
-        assert sent(method, deviations=absent, include=UNSET) == sent(method)
+        assert sent(method, std=absent, include=UNSET) == sent(method)
     for number in [1, 0.0, "yes", [True]]:
         with pytest.raises(TypeError, match=r"^deviations is to be True or False, not "):
-            sent(method, deviations=number)
+            sent(method, std=number)
     with pytest.raises(ValueError, match=r"^include is 'deviation', .*; did you mean 'deviations'\?$"):
         sent(method, include="deviation")
     with pytest.raises(TypeError, match=rf"^{method}\(\) has no parameter 'deviation'; did you mean 'deviations'\?$"):
@@ -477,12 +477,12 @@ def test_deviations_may_be_asked_for_by_their_own_name(method: str) -> None:
 
 @pytest.mark.parametrize("include", QUANTITIES, ids=repr)
 def test_one_word_may_stand_for_a_list(include: object) -> None:
-    assert sent("posterior", include=include)["include"] == ["variance"]
+    assert sent("posterior", include=include)["include"] == ["variances"]
 
 
 def test_several_words_keep_their_order() -> None:
     for method in ["posterior", "posterior_batch"]:
-        assert sent(method, include=("gradients", "variance"))["include"] == ["gradients", "variance"]
+        assert sent(method, include=("gradients", "variances"))["include"] == ["gradients", "variances"]
 
 
 @every_method
@@ -504,19 +504,19 @@ def test_other_words_are_refused_with_the_nearest(
     with pytest.raises(kind, match=rf"^{message}"):
         sent(method, solver=solver)
     if method in OPERATORS:
-        with pytest.raises(kind, match=rf"^geometry.{message}"):
-            sent(method, geometry={"solver": solver})
+        with pytest.raises(kind, match=rf"^surface.{message}"):
+            sent(method, surface={"solver": solver})
 
 
 def test_misspelt_words_of_other_fields_name_the_nearest() -> None:
     with pytest.raises(ValueError, match=r"^include is 'variances', .*; did you mean 'variance'\?$"):
         sent("posterior", include="variances")
     with pytest.raises(ValueError, match=r"^include\[1\] is 'covarianc', .*; did you mean 'covariance'\?$"):
-        sent("posterior", include=["variance", "covarianc"])
+        sent("posterior", include=["variances", "covarianc"])
     with pytest.raises(TypeError, match=r"^include\[0\] is to be one of .*, not of the type int$"):
         sent("posterior", include=[1])
     with pytest.raises(TypeError, match=r"^include is to be one of .*, not of the type dict$"):
-        sent("posterior", include={"variance": True})
+        sent("posterior", include={"variances": True})
     with pytest.raises(ValueError, match=r"^orientation is 'outwards', .*; did you mean 'outward'\?$"):
         sent("normals", orientation="outwards")
 
@@ -573,7 +573,7 @@ KERNELS: dict[str, tuple[Any, dict[str, Any]]] = {
 def test_kernels_of_all_kinds_are_kernels(method: str, kernel: object, expected: object) -> None:
     assert sent(method, kernel=kernel)["kernel"] == expected
     if method in OPERATORS:
-        assert sent(method, geometry={"kernel": kernel})["geometry"] == {"kernel": expected}
+        assert sent(method, surface={"kernel": kernel})["surface"] == {"kernel": expected}
 
 
 @pytest.mark.parametrize(
@@ -631,8 +631,8 @@ def test_other_things_than_kernels_are_refused(
     with pytest.raises(kind, match=rf"^{message}"):
         sent(method, kernel=kernel)
     if method in OPERATORS:
-        with pytest.raises(kind, match=rf"^geometry.{message}"):
-            sent(method, geometry=Geometry(kernel=kernel))  # type: ignore[arg-type]
+        with pytest.raises(kind, match=rf"^surface.{message}"):
+            sent(method, surface=Surface(kernel=kernel))  # type: ignore[arg-type]
 
 
 def test_a_kernel_is_checked_where_it_is_written() -> None:
@@ -761,29 +761,29 @@ def test_a_geometry_may_be_of_another_cloud(method: str) -> None:
     other.description.n_points = 5
     reference = models.CloudRef(id=other.id)
     for geometry in [
-        Geometry(cloud=other),
-        Geometry(cloud=other.id),
+        Surface(cloud=other),
+        Surface(cloud=other.id),
         {"cloud": other},
         {"cloud": other.description},
         {"cloud": {"id": other.id}},
-        models.Geometry(cloud=reference),
+        models.Surface(cloud=reference),
         other,
         other.id,
     ]:
-        assert sent(method, geometry=geometry)["geometry"] == {"cloud": {"id": other.id}}
-    noise = sent(method, geometry=Geometry(cloud=other, noise_variances=range(5)))["geometry"]["noise_variances"]
+        assert sent(method, surface=geometry)["surface"] == {"cloud": {"id": other.id}}
+    noise = sent(method, surface=Surface(cloud=other, noise_variances=range(5)))["surface"]["noise_variances"]
     assert noise == [0, 1, 2, 3, 4]
-    with pytest.raises(ValueError, match=r"^geometry.noise_variances must have the shape \[n\] = \[5\], not \[8\]"):
-        sent(method, geometry=Geometry(cloud=other, noise_variances=VALUES))
-    assert sent(method, geometry=Geometry(cloud=other.id, noise_variances=[1]))["geometry"]["noise_variances"] == [1]
-    with pytest.raises(TypeError, match=r"^geometry.cloud is to be a Cloud, as .* returns, not of the type ndarray$"):
-        sent(method, geometry={"cloud": CIRCLE})
-    with pytest.raises(ValueError, match=r"^geometry.cloud is 'gauss', and ids of clouds are 64 hexadecimal digits$"):
-        sent(method, geometry="gauss")
+    with pytest.raises(ValueError, match=r"^surface.noise_variances must have the shape \[n\] = \[5\], not \[8\]"):
+        sent(method, surface=Surface(cloud=other, noise_variances=VALUES))
+    assert sent(method, surface=Surface(cloud=other.id, noise_variances=[1]))["surface"]["noise_variances"] == [1]
+    with pytest.raises(TypeError, match=r"^surface.cloud is to be a Cloud, as .* returns, not of the type ndarray$"):
+        sent(method, surface={"cloud": CIRCLE})
+    with pytest.raises(ValueError, match=r"^surface.cloud is 'gauss', and ids of clouds are 64 hexadecimal digits$"):
+        sent(method, surface="gauss")
     with pytest.raises(TypeError, match=r"^geometry has no 'kernal', but 'kernel', .*; did you mean 'kernel'\?$"):
-        sent(method, geometry={"kernal": "gauss"})
-    with pytest.raises(TypeError, match=r"^Geometry\(\) has no parameter 'kernal'; did you mean 'kernel'\?$"):
-        Geometry(kernal="gauss")  # type: ignore[call-arg]
+        sent(method, surface={"kernal": "gauss"})
+    with pytest.raises(TypeError, match=r"^Surface\(\) has no parameter 'kernal'; did you mean 'kernel'\?$"):
+        Surface(kernal="gauss")  # type: ignore[call-arg]
 
 
 # Hyperparameters
@@ -819,18 +819,18 @@ def test_none_is_as_absent_everywhere(method: str, absent: object) -> None:
     names += ["queries"] if method in QUERYING else []
     names += {
         "interpolate": ["derivatives"],
-        "interpolate_batch": ["derivatives", "deviations", "mean"],
+        "interpolate_batch": ["derivatives", "std", "mean"],
         "posterior": ["include"],
         "posterior_batch": ["include", "samples", "quantiles", "threshold", "mean"],
         "select_model": ["criterion", "vary", "families", "restarts", "seed", "mean"],
-        "normals": ["surface", "orientation"],
+        "normals": ["surface_model", "orientation"],
     }.get(method, [])
-    names += ["geometry"] if method in OPERATORS else []
+    names += ["surface"] if method in OPERATORS else []
     names += ["hyperparameters"] if method in SURFACES else []
     assert sent(method, **dict.fromkeys(names, absent), alpha=None) == sent(method)
     if method in OPERATORS:
-        nothing = {"cloud": absent, "kernel": absent, "noise_variances": absent, "solver": absent, "surface": absent}
-        assert sent(method, geometry=nothing)["geometry"] == {}
+        nothing = {"cloud": absent, "kernel": absent, "noise_variances": absent, "solver": absent, "surface_model": absent}
+        assert sent(method, surface=nothing)["surface"] == {}
 
 
 @every_method

@@ -73,7 +73,7 @@ def assert_same(found: Any, single: gramian.Normals | gramian.Curvatures) -> Non
     """Asserts that all numbers and flags are equal up to rounding."""
     for name, array in vars(found).items():
         if name == "reasons":
-            flagged = {entry.query: entry.reason.value for entry in single.degenerate}
+            flagged = {entry.query: entry.reason.value for entry in single.flags}
             assert {row: reason for row, reason in enumerate(array.tolist()) if reason} == flagged
         elif array is not None:
             expected = getattr(single, name)
@@ -86,12 +86,12 @@ def test_surfaces_are_those_of_one_request(
     tiles = service.tiles(da.from_array(points, chunks=(1700, 3)), n_tiles=4)
     assert np.bincount(tiles.cells().compute()).tolist() == [1500] * 4
     normals, curvatures, laplace, gradient = dask.compute(
-        tiles.normals(), tiles.curvatures(deviations=True), tiles.laplace_beltrami(), tiles.surface_gradient()
+        tiles.normals(), tiles.curvatures(std=True), tiles.laplace_beltrami(), tiles.surface_gradient()
     )
     cloud = client.cloud(points)
     assert_same(normals, cloud.normals(solver="local", hyperparameters=tiles.hyperparameters))
-    assert_same(curvatures, cloud.curvatures(solver="local", deviations=True, hyperparameters=tiles.hyperparameters))
-    assert curvatures.mean_curvature_deviations.shape == (6000,)
+    assert_same(curvatures, cloud.curvatures(solver="local", std=True, hyperparameters=tiles.hyperparameters))
+    assert curvatures.mean_curvature_std.shape == (6000,)
     learned = cloud.normals(points[:1], solver="local", sites=tiles.plan.sites.points).diagnostics
     assert learned.hyperparameters == tiles.hyperparameters
     of_all = [cloud.laplace_beltrami_sparse_matrix(solver="local", hyperparameters=tiles.hyperparameters).matrix]
@@ -116,9 +116,9 @@ def test_points_may_coincide_and_be_few(client: gramian.Client, service: gramian
     points = torus(900)
     points = np.concatenate([points, points[:40]])
     tiles = service.tiles(points, n_tiles)
-    (found,) = dask.compute(tiles.curvatures(deviations=True))
+    (found,) = dask.compute(tiles.curvatures(std=True))
     assert_same(
-        found, client.cloud(points).curvatures(solver="local", deviations=True, hyperparameters=tiles.hyperparameters)
+        found, client.cloud(points).curvatures(solver="local", std=True, hyperparameters=tiles.hyperparameters)
     )
 
 
@@ -149,12 +149,12 @@ def test_values_are_those_of_one_request(client: gramian.Client, service: gramia
     kernel = gramian.Kernel("matern", length_scales=[0.3, 0.6, 1.2])
     fit = gramian.ValuesFit(kernel=kernel, alpha=1e-3, mean="zero", solver="local")
     found = tiles.interpolate(
-        values, da.from_array(queries, chunks=(300, 3)), derivatives=1, deviations=True, kernel=kernel, alpha=1e-3
+        values, da.from_array(queries, chunks=(300, 3)), derivatives=1, std=True, kernel=kernel, alpha=1e-3
     )
     assert found.values.chunks == ((300, 300, 100),)
     (found,) = dask.compute(found)
-    single = client.cloud(points).interpolate(values, queries, derivatives=1, deviations=True, **fit)
-    for name in ("values", "gradients", "value_deviations", "gradient_deviations"):
+    single = client.cloud(points).interpolate(values, queries, derivatives=1, std=True, **fit)
+    for name in ("values", "gradients", "value_std", "gradient_std"):
         np.testing.assert_allclose(getattr(found, name), getattr(single, name), rtol=1e-9, atol=1e-9, err_msg=name)
     assert found.hessians is None
 

@@ -20,7 +20,7 @@ import pytest
 import scipy.sparse
 
 import gramian
-from gramian import Cloud, Geometry, InterpolationBatch, Kernel, KernelFamily, PosteriorBatch
+from gramian import Cloud, Surface, InterpolationBatch, Kernel, KernelFamily, PosteriorBatch
 from gramian.answers import Answer
 from gramian.rest import models
 from gramian.rest.api.geometry import compute_normals
@@ -36,17 +36,17 @@ OPERATIONS: dict[str, Callable[[Cloud], object]] = {
     "posterior": lambda cloud: cloud.posterior(
         squares(cloud),
         QUERIES,
-        include=["variance", "observation_variance", "covariance", "gradients", "log_marginal_likelihood"],
+        include=["variances", "observation_variances", "covariance", "gradients", "log_marginal_likelihood"],
         kernel={"family": "gauss", "length_scale": 2.0},
         alpha=1e-6,
     ),
     "interpolate_batch": lambda cloud: cloud.interpolate_batch(
-        lists(cloud), QUERIES, derivatives=2, deviations=True, mean="linear", kernel=GAUSS
+        lists(cloud), QUERIES, derivatives=2, std=True, mean="linear", kernel=GAUSS
     ),
     "posterior_batch": lambda cloud: cloud.posterior_batch(
         lists(cloud),
         QUERIES,
-        include=["variance", "covariance", "gradients", "gradient_variances", "log_marginal_likelihood"],
+        include=["variances", "covariance", "gradients", "gradient_variances", "log_marginal_likelihood"],
         samples={"count": 4, "seed": 1},
         quantiles=[0.1, 0.5, 0.9],
         threshold=0.5,
@@ -72,15 +72,15 @@ OPERATIONS: dict[str, Callable[[Cloud], object]] = {
         squares(cloud), noise_variances=np.linspace(0.1, 0.2, cloud.n_points)
     ),
     "posterior with noise": lambda cloud: cloud.posterior(
-        squares(cloud), noise_variances=np.linspace(0.1, 0.2, cloud.n_points), include=["variance"]
+        squares(cloud), noise_variances=np.linspace(0.1, 0.2, cloud.n_points), include=["variances"]
     ),
     "normals": lambda cloud: cloud.normals(
-        QUERIES, kernel=GAUSS, surface="signature", orientation="gradient", solver=None
+        QUERIES, kernel=GAUSS, surface_model="signature", orientation="gradient", solver=None
     ),
     "curvatures": lambda cloud: cloud.curvatures(QUERIES, kernel=GAUSS, alpha=0),
     "normals nowhere": lambda cloud: cloud.normals([[0, 0]], kernel=GAUSS, alpha=0),
     "curvatures nowhere": lambda cloud: cloud.curvatures([[0, 0]], kernel=GAUSS, alpha=0),
-    "gradients nowhere": lambda cloud: cloud.surface_gradient(squares(cloud), [[0, 0]], kernel=GAUSS, deviations=True),
+    "gradients nowhere": lambda cloud: cloud.surface_gradient(squares(cloud), [[0, 0]], kernel=GAUSS, std=True),
     "matrices nowhere": lambda cloud: cloud.surface_gradient_matrix([[0, 0]], kernel=GAUSS),
     "matrix nowhere": lambda cloud: cloud.laplace_beltrami_matrix([[0, 0]], kernel=GAUSS),
     "sparse matrices nowhere": lambda cloud: cloud.surface_gradient_sparse_matrix([[0, 0]], kernel=GAUSS),
@@ -89,12 +89,12 @@ OPERATIONS: dict[str, Callable[[Cloud], object]] = {
     "surface_gradient_matrix": lambda cloud: cloud.surface_gradient_matrix(QUERIES, kernel=GAUSS),
     "laplace_beltrami": lambda cloud: cloud.laplace_beltrami(squares(cloud), QUERIES, kernel=GAUSS),
     "laplace_beltrami_matrix": lambda cloud: cloud.laplace_beltrami_matrix(QUERIES, kernel=GAUSS),
-    "deviations": lambda cloud: cloud.curvatures(QUERIES, kernel=GAUSS, alpha=0, deviations=True),
-    "deviations of normals": lambda cloud: cloud.normals(QUERIES, include="deviations"),
+    "std": lambda cloud: cloud.curvatures(QUERIES, kernel=GAUSS, alpha=0, std=True),
+    "deviations of normals": lambda cloud: cloud.normals(QUERIES, include="std"),
     "surface_gradient_sparse_matrix": lambda cloud: cloud.surface_gradient_sparse_matrix(QUERIES, kernel=GAUSS),
     "laplace_beltrami_sparse_matrix": lambda cloud: cloud.laplace_beltrami_sparse_matrix(QUERIES, kernel=GAUSS),
     "another surface": lambda cloud: cloud.laplace_beltrami(
-        squares(cloud), kernel=GAUSS, geometry=Geometry(cloud=cloud, alpha=1e-8, noise_variances=None)
+        squares(cloud), kernel=GAUSS, surface=Surface(cloud=cloud, alpha=1e-8, noise_variances=None)
     ),
 }
 
@@ -173,22 +173,22 @@ def test_measured_values_need_no_parameters(client: gramian.Client) -> None:
     turn = np.arange(300) * np.pi * (3 - np.sqrt(5))
     points = np.column_stack([np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn), z])
     sphere, values = client.cloud(points), 20 + z + 0.02 * random.normal(size=300)
-    answer = sphere.interpolate(values, points[:40], derivatives=2, deviations=True)
-    assert answer.value_deviations is not None
-    assert answer.gradient_deviations is not None
-    assert answer.hessian_deviations is not None
-    assert answer.gradient_deviations.shape == (40, 3)
-    assert answer.hessian_deviations.shape == (40, 3, 3)
-    assert np.all(np.abs(answer.values - 20 - z[:40]) < 4 * answer.value_deviations)
+    answer = sphere.interpolate(values, points[:40], derivatives=2, std=True)
+    assert answer.value_std is not None
+    assert answer.gradient_std is not None
+    assert answer.hessian_std is not None
+    assert answer.gradient_std.shape == (40, 3)
+    assert answer.hessian_std.shape == (40, 3, 3)
+    assert np.all(np.abs(answer.values - 20 - z[:40]) < 4 * answer.value_std)
     assert answer.fit["mean"] == "constant"
-    laplacian = sphere.laplace_beltrami(values, deviations=True)
-    assert laplacian.value_deviations is not None
-    within = np.abs(laplacian.values + 2 * z) < 1.96 * laplacian.value_deviations
+    laplacian = sphere.laplace_beltrami(values, std=True)
+    assert laplacian.value_std is not None
+    within = np.abs(laplacian.values + 2 * z) < 1.96 * laplacian.value_std
     assert within.mean() > 0.88
-    gradient = sphere.surface_gradient(values, include="deviations", mean="linear")
-    assert gradient.gradient_deviations is not None
-    assert gradient.gradient_deviations.shape == (300, 3)
-    assert sphere.surface_gradient(values, kernel="matern").gradient_deviations is None
+    gradient = sphere.surface_gradient(values, include="std", mean="linear")
+    assert gradient.gradient_std is not None
+    assert gradient.gradient_std.shape == (300, 3)
+    assert sphere.surface_gradient(values, kernel="matern").gradient_std is None
 
 
 def test_a_batch_answers_what_each_list_alone_does(client: gramian.Client) -> None:
@@ -198,13 +198,13 @@ def test_a_batch_answers_what_each_list_alone_does(client: gramian.Client) -> No
     values = np.stack([np.sin(3 * points[:, 0]), points[:, 1] + 2, 5 * points[:, 0] * points[:, 1]])
     values += 0.05 * random.normal(size=(3, 60))
     for fit in [gramian.ValuesFit(mean="linear"), gramian.ValuesFit(kernel=GAUSS, alpha=1e-4), gramian.ValuesFit()]:
-        answer = cloud.interpolate_batch(values, queries, derivatives=2, deviations=True, **fit)
+        answer = cloud.interpolate_batch(values, queries, derivatives=2, std=True, **fit)
         assert_shapes(answer, values=(3, 7), gradients=(3, 7, 2), hessians=(3, 7, 2, 2))
-        assert_shapes(answer, value_deviations=(7,), gradient_deviations=(7, 2), hessian_deviations=(7, 2, 2))
+        assert_shapes(answer, value_std=(7,), gradient_std=(7, 2), hessian_std=(7, 2, 2))
         for i, of_one in enumerate(values):
-            single = cloud.interpolate(of_one, queries, derivatives=2, deviations=True, **answer.fit)
+            single = cloud.interpolate(of_one, queries, derivatives=2, std=True, **answer.fit)
             assert_row(answer, i, single, "values", "gradients", "hessians")
-            for name in ["value_deviations", "gradient_deviations", "hessian_deviations"]:
+            for name in ["value_std", "gradient_std", "hessian_std"]:
                 np.testing.assert_allclose(getattr(answer, name), getattr(single, name), rtol=1e-9, err_msg=name)
             mean = single.diagnostics.mean_coefficients
             if isinstance(mean, gramian.Unset):
@@ -295,7 +295,7 @@ def test_a_selection_finds_what_explains_values(client: gramian.Client) -> None:
     errors = (values - found.leave_one_out.means) / np.sqrt(found.leave_one_out.variances)
     densities = -0.5 * errors**2 - 0.5 * np.log(2 * np.pi * found.leave_one_out.variances)
     np.testing.assert_allclose(found.leave_one_out.log_predictive_densities, densities, rtol=1e-9)
-    others = client.cloud(points[1:]).posterior(values[1:], points[:1], include="observation_variance", **found.fit)
+    others = client.cloud(points[1:]).posterior(values[1:], points[:1], include="observation_variances", **found.fit)
     assert others.observation_variances is not None
     assert others.means[0] == pytest.approx(found.leave_one_out.means[0], abs=1e-6)
     assert others.observation_variances[0] == pytest.approx(found.leave_one_out.variances[0], rel=1e-6)
@@ -343,7 +343,7 @@ def test_an_entry_without_meaning_is_nan(client: gramian.Client, circle: Array) 
     np.testing.assert_allclose(answer.principal_curvatures[0], 1, atol=1e-4)
     assert np.isnan(answer.principal_curvatures[1]).all()
     assert np.isnan(answer.normals[1]).all()
-    assert answer.degenerate[0].reason is gramian.DegenerateReason.VANISHING_GRADIENT
+    assert answer.flags[0].reason is gramian.FlagReason.VANISHING_GRADIENT
 
 
 def test_deviations_are_there_where_they_are_asked_for(client: gramian.Client) -> None:
@@ -352,26 +352,26 @@ def test_deviations_are_there_where_they_are_asked_for(client: gramian.Client) -
     points *= (1 + 0.01 * rng.normal(size=(400, 1))) / np.linalg.norm(points, axis=1, keepdims=True)
     cloud = client.cloud(points)
     queries = np.vstack([points[:7], [[50.0, 0.0, 0.0]]])
-    answer = cloud.curvatures(queries, deviations=True)
-    deviations = [answer.normal_deviations, answer.mean_curvature_deviations, answer.gaussian_curvature_deviations]
+    answer = cloud.curvatures(queries, std=True)
+    deviations = [answer.normal_std, answer.mean_curvature_std, answer.gaussian_curvature_std]
     for numbers, of_what in zip(deviations, [answer.mean_curvatures] * 3, strict=True):
         assert numbers is not None
         assert numbers.shape == (8,)
         assert (np.isnan(of_what) <= np.isnan(numbers)).all()
         assert (numbers[:7] > 0).all()
-    assert answer.principal_curvature_deviations is not None
-    assert answer.principal_curvature_deviations.shape == (8, 2)
-    assert answer.mean_curvature_deviations is not None
-    errors = np.abs(answer.mean_curvatures[:7] - 1) / answer.mean_curvature_deviations[:7]
+    assert answer.principal_curvature_std is not None
+    assert answer.principal_curvature_std.shape == (8, 2)
+    assert answer.mean_curvature_std is not None
+    errors = np.abs(answer.mean_curvatures[:7] - 1) / answer.mean_curvature_std[:7]
     assert np.median(errors) < 2
     assert answer.diagnostics.solver is gramian.SolverUsed.LOCAL
     assert answer.diagnostics.noise_deviation == pytest.approx(0.01, rel=0.3)
-    normals = cloud.normals(queries, include="deviations")
-    assert normals.normal_deviations is not None
-    assert normals.normal_deviations.shape == (8,)
+    normals = cloud.normals(queries, include="std")
+    assert normals.normal_std is not None
+    assert normals.normal_std.shape == (8,)
     plain = cloud.curvatures(queries)
-    assert plain.normal_deviations is plain.principal_curvature_deviations is plain.mean_curvature_deviations is None
-    assert cloud.normals(queries).normal_deviations is None
+    assert plain.normal_std is plain.principal_curvature_std is plain.mean_curvature_std is None
+    assert cloud.normals(queries).normal_std is None
 
 
 @pytest.mark.parametrize("format_", ["safetensors", "json"])
@@ -387,7 +387,7 @@ def test_sparse_matrices_are_those_of_scipy(format_: Format) -> None:
     tangents = np.array([-np.sin(angles[:5]), np.cos(angles[:5])])
     found = np.array([matrix @ np.sin(angles) for matrix in gradient.matrices])
     np.testing.assert_allclose(found, np.cos(angles[:5]) * tangents, atol=1e-4)
-    assert repr(laplace).startswith("LaplaceBeltramiSparseMatrix(matrix=csr_matrix[200, 200], degenerate=()")
+    assert repr(laplace).startswith("LaplaceBeltramiSparseMatrix(matrix=csr_matrix[200, 200], flags=()")
 
 
 def test_without_scipy_an_error_says_what_is_missing(circle: Array) -> None:
@@ -466,22 +466,22 @@ def test_a_file_is_a_cloud(client: gramian.Client, tmp_path: Path) -> None:
 
 def test_the_cloud_of_a_geometry_is_posted_again(client: gramian.Client, circle: Array) -> None:
     nodes, surface = client.cloud(circle), client.cloud(1.5 * circle)
-    geometry = Geometry(cloud=surface, kernel={"family": "gauss", "length_scale": 3.0}, alpha=0.0)
-    expected = nodes.laplace_beltrami(squares(nodes), geometry=geometry)
+    geometry = Surface(cloud=surface, kernel={"family": "gauss", "length_scale": 3.0}, alpha=0.0)
+    expected = nodes.laplace_beltrami(squares(nodes), surface=geometry)
     assert expected.values.shape == (8,)
-    assert isinstance(expected.diagnostics.geometry, gramian.Diagnostics)
-    assert expected.diagnostics.geometry.cloud_id == surface.id
+    assert isinstance(expected.diagnostics.surface, gramian.Diagnostics)
+    assert expected.diagnostics.surface.cloud_id == surface.id
     for forgotten in [[nodes], [surface], [nodes, surface]]:
         for cloud in forgotten:
             forget(cloud)
-        answer = nodes.laplace_beltrami(squares(nodes), geometry=geometry)
+        answer = nodes.laplace_beltrami(squares(nodes), surface=geometry)
         np.testing.assert_array_equal(answer.values, expected.values)
 
 
 def test_the_cloud_of_a_geometry_may_be_of_another_client(client: gramian.Client, circle: Array) -> None:
     surface = gramian.Client().cloud(1.25 * circle)
     forget(surface)
-    answer = client.cloud(circle).laplace_beltrami_matrix(geometry=Geometry(cloud=surface))
+    answer = client.cloud(circle).laplace_beltrami_matrix(surface=Surface(cloud=surface))
     assert answer.matrix.shape == (8, 8)
 
 
@@ -554,11 +554,11 @@ def test_a_matrix_too_close_to_singular_says_which_alpha_helps(client: gramian.C
     cloud = client.cloud(circle)
     flat = Kernel(family=KernelFamily.GAUSS, length_scale=1e4)
     with pytest.raises(gramian.NotPositiveDefinite) as caught:
-        cloud.posterior(np.ones(8), kernel=flat, alpha=0, include=["variance"])
+        cloud.posterior(np.ones(8), kernel=flat, alpha=0, include=["variances"])
     remedy = caught.value.minimum_alpha
     assert remedy is not None
     assert "set alpha to" in str(caught.value)
-    cloud.posterior(np.ones(8), kernel=flat, alpha=remedy, include=["variance"])
+    cloud.posterior(np.ones(8), kernel=flat, alpha=remedy, include=["variances"])
 
 
 @pytest.mark.parametrize("format_", ["safetensors", "json"])
@@ -569,8 +569,8 @@ def test_pointers_are_the_same_in_both_formats(format_: Format, circle: Array) -
         "/kernel/nu": lambda: cloud.normals(kernel={"family": "gauss", "nu": 2.5}),
         "/alpha": lambda: cloud.interpolate(np.ones(8), alpha=-1),
         "/noise_variances/4": lambda: cloud.normals(noise_variances=np.arange(3, -5, -1)),
-        "/geometry/noise_variances/0": lambda: cloud.laplace_beltrami_matrix(
-            geometry=Geometry(noise_variances=np.full(8, -1))
+        "/surface/noise_variances/0": lambda: cloud.laplace_beltrami_matrix(
+            surface=Surface(noise_variances=np.full(8, -1))
         ),
     }
     for pointer, refused in refusals.items():
@@ -603,20 +603,20 @@ def test_arrays_of_any_layout_are_sent_right(client: gramian.Client, circle: Arr
 
 def test_what_is_accepted_is_so_for_type_checkers(client: gramian.Client, circle: Array) -> None:
     cloud, other = client.cloud(circle), client.cloud(2 * circle)
-    answer = cloud.posterior(range(8), kernel="gauss", alpha=np.float32(0.5), include="variance")
+    answer = cloud.posterior(range(8), kernel="gauss", alpha=np.float32(0.5), include="variances")
     said = answer.diagnostics
-    cloud.posterior([0.5] * 8, kernel=said.kernel, alpha=said.alpha, solver=said.solver, include=["variance"])
+    cloud.posterior([0.5] * 8, kernel=said.kernel, alpha=said.alpha, solver=said.solver, include=["variances"])
     cloud.interpolate(np.arange(8), derivatives=np.int64(1), **answer.fit)
-    cloud.normals(kernel=client.kernels()[0], alpha=np.array(0.5), surface="auto")
+    cloud.normals(kernel=client.kernels()[0], alpha=np.array(0.5), surface_model="auto")
     cloud.curvatures(kernel={"family": "gauss", "length_scale": np.float32(2)}, alpha=Fraction(1, 2))
     cloud.normals(kernel=models.Kernel(family=KernelFamily.GAUSS), noise_variances=np.full(8, 0.1, dtype=np.float32))
-    operator = cloud.laplace_beltrami_matrix(geometry={"kernel": Kernel("gauss"), "alpha": np.int64(1)})
+    operator = cloud.laplace_beltrami_matrix(surface={"kernel": Kernel("gauss"), "alpha": np.int64(1)})
     cloud.laplace_beltrami_matrix(**operator.fit)
-    cloud.laplace_beltrami(range(8), geometry=other)
-    assert not isinstance(operator.diagnostics.geometry, gramian.Unset)
-    cloud.surface_gradient(range(8), geometry=operator.diagnostics.geometry)
+    cloud.laplace_beltrami(range(8), surface=other)
+    assert not isinstance(operator.diagnostics.surface, gramian.Unset)
+    cloud.surface_gradient(range(8), surface=operator.diagnostics.surface)
     fit: gramian.Fit = {"kernel": "matern", "alpha": 0}
-    cloud.surface_gradient_matrix(geometry=Geometry(kernel="gauss", alpha=said.alpha), **fit)
+    cloud.surface_gradient_matrix(surface=Surface(kernel="gauss", alpha=said.alpha), **fit)
 
 
 def test_answers_and_problems_can_be_pickled_and_copied(client: gramian.Client, circle: Array) -> None:

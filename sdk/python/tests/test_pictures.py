@@ -33,7 +33,7 @@ def cloud() -> Any:
 
 @pytest.fixture(scope="module")
 def mesh(cloud: Any) -> gramian.Mesh:
-    found: gramian.Mesh = cloud.level_set(include="curvatures", deviations=True)
+    found: gramian.Mesh = cloud.level_set(include="curvatures", std=True)
     return found
 
 
@@ -44,7 +44,7 @@ def test_a_mesh_is_closed_and_knows_its_errors(mesh: gramian.Mesh) -> None:
     assert mesh.cells.dtype == np.int64
     assert set(mesh.support) == {"observed"}
     assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - 1).max() < 0.01
-    for array in (mesh.mean_curvatures, mesh.position_deviations, mesh.normal_deviations):
+    for array in (mesh.mean_curvatures, mesh.position_std, mesh.normal_std):
         assert array is not None
         assert array.shape == (part.n_vertices,)
 
@@ -78,13 +78,13 @@ def test_a_level_of_values_is_a_mesh() -> None:
 
 
 def test_answers_draw_themselves(cloud: Any, mesh: gramian.Mesh) -> None:
-    curvatures = cloud.curvatures(deviations=True)
+    curvatures = cloud.curvatures(std=True)
     assert np.shares_memory(curvatures.positions, cloud.points)
     display = curvatures.plot()
     assert isinstance(display, SurfaceDisplay)
     assert display.figure_ is display.axes_.figure
     assert (display.mappable_.norm.vmin, display.axes_.get_title()) == (-display.mappable_.norm.vmax, "mean curvatures")
-    assert mesh.plot("position_deviations").axes_.get_title() == "position deviations"
+    assert mesh.plot("position_std").axes_.get_title() == "position deviations"
     assert cloud.normals([[1.0, 0, 0], [0, 1.0, 0]]).plot().positions.shape == (2, 3)
     with pytest.raises(ValueError, match="no such_thing"):
         curvatures.plot("such_thing")
@@ -94,7 +94,7 @@ def test_posteriors_and_likelihoods_are_lines() -> None:
     x = np.linspace(0, 6, 20)
     line = gramian.Client().cloud(x[:, None])
     values = np.sin(x)
-    posterior = line.posterior(values, [[1.0], [2.0]], include="variance", kernel="gauss", alpha=1e-4).plot()
+    posterior = line.posterior(values, [[1.0], [2.0]], include="variances", kernel="gauss", alpha=1e-4).plot()
     assert isinstance(posterior, PosteriorDisplay)
     assert posterior.places.tolist() == [1.0, 2.0]
     assert isinstance(line.select_model(values, families="gauss").plot(), LikelihoodDisplay)

@@ -76,7 +76,7 @@ def test_the_cloud_of_the_surface_is_posted_where_it_is_asked_for() -> None:
     cloud = gramian.Cloud(client._connection, description, CIRCLE)
     surface = client.cloud(2 * CIRCLE)
     with pytest.raises(gramian.UnknownCloud):
-        cloud.laplace_beltrami(np.ones(8), geometry=surface)
+        cloud.laplace_beltrami(np.ones(8), surface=surface)
     assert [(path, about) for _, path, about in asked[1:]] == [
         ("/v1/laplace-beltrami", OTHER),
         ("/v1/clouds", OTHER),

@@ -20,7 +20,7 @@ from gramian.rest.models import (
     CloudRequest,
     CurvaturesRequest,
     CurvaturesResponse,
-    DegenerateReason,
+    FlagReason,
     FactorizationUsed,
     Kernel,
     KernelFamily,
@@ -30,7 +30,7 @@ from gramian.rest.models import (
     PosteriorRequest,
     PosteriorResponse,
     Problem,
-    SurfaceUsed,
+    SurfaceModelUsed,
 )
 from gramian.rest.types import Unset
 
@@ -71,11 +71,11 @@ def test_curvatures_with_a_null_entry(client: Client, cloud: CloudRef) -> None:
     assert answer.principal_directions[1] is None
     assert answer.mean_curvatures[1] is None
 
-    assert answer.surfaces == [SurfaceUsed.SIGNATURE, SurfaceUsed.SIGNATURE]
-    assert isinstance(answer.surfaces[0], SurfaceUsed)
-    [degenerate] = answer.degenerate
-    assert (degenerate.query, degenerate.reason) == (1, DegenerateReason.VANISHING_GRADIENT)
-    assert isinstance(degenerate.reason, DegenerateReason)
+    assert answer.surfaces == [SurfaceModelUsed.SIGNATURE, SurfaceModelUsed.SIGNATURE]
+    assert isinstance(answer.surfaces[0], SurfaceModelUsed)
+    [flags] = answer.flags
+    assert (flags.query, flags.reason) == (1, FlagReason.VANISHING_GRADIENT)
+    assert isinstance(flags.reason, FlagReason)
     assert answer.diagnostics.kernel.family is KernelFamily.GAUSS
     assert answer.diagnostics.factorization is FactorizationUsed.CHOLESKY
     assert answer.diagnostics.alpha == 0.0

@@ -68,7 +68,7 @@ def test_predictions_are_those_of_the_posterior(client: gramian.Client, choices:
     model = KernelRegressor(**choices).fit(X, Y)
     is_each = np.ndim(choices.get("alpha", 0)) > 0
     fit = {"noise_variances" if is_each and name == "alpha" else name: value for name, value in choices.items()}
-    answer = client.cloud(X).posterior(Y, QUERIES, include="variance", **fit)
+    answer = client.cloud(X).posterior(Y, QUERIES, include="variances", **fit)
     assert answer.variances is not None
     mean, std = model.predict(QUERIES, return_std=True)
     np.testing.assert_array_equal(mean, answer.means)

@@ -73,7 +73,7 @@ def test_no_argument_or_result_is_any() -> None:
 
 
 def test_requests_have_no_later_members() -> None:
-    sent = [models.CloudRef, models.Kernel, models.Geometry, models.Samples, models.FreeParameter]
+    sent = [models.CloudRef, models.Kernel, models.Surface, models.Samples, models.FreeParameter]
     sent += [models.MeshBounds]
     sent += [models.Hyperparameters, models.MeansLevel, models.NoiseRatio]  # as they were answered
     sent += [models.Region, models.Border, models.TileRegions, models.Link]
@@ -94,9 +94,9 @@ def test_every_model_is_a_named_schema() -> None:
 
 def test_enumerations_are_enumerations() -> None:
     assert models.KernelFamily("gauss") is models.KernelFamily.GAUSS
-    hints = fields(models.CurvaturesResponse) | fields(models.Degenerate) | fields(models.Diagnostics)
-    assert hints["surfaces"] == list[models.SurfaceUsed]
-    assert hints["reason"] is models.DegenerateReason
+    hints = fields(models.CurvaturesResponse) | fields(models.Flag) | fields(models.Diagnostics)
+    assert hints["surface_models"] == list[models.SurfaceModelUsed]
+    assert hints["reason"] is models.FlagReason
     assert hints["solver"] is models.SolverUsed
     assert hints["factorization"] is models.FactorizationUsed
     assert fields(models.Warning_)["code"] is models.WarningCode
@@ -112,9 +112,9 @@ def test_nullable_entries_are_nullable_and_nothing_else_is() -> None:
     assert curvatures["principal_directions"] == list[list[row] | None]
     assert curvatures["mean_curvatures"] == list[float | None]
     assert curvatures["gaussian_curvatures"] == list[float | None]
-    assert curvatures["principal_curvature_deviations"] == list[row | None] | Unset
+    assert curvatures["principal_curvature_std"] == list[row | None] | Unset
     for of_what in ["normal", "mean_curvature", "gaussian_curvature"]:
-        assert curvatures[f"{of_what}_deviations"] == list[float | None] | Unset
+        assert curvatures[f"{of_what}_std"] == list[float | None] | Unset
     assert fields(models.SurfaceGradientResponse)["gradients"] == list[row | None]
     assert fields(models.SurfaceGradientMatrixResponse)["matrices"] == list[list[row | None]]
     assert fields(models.LaplaceBeltramiResponse)["values"] == list[float | None]
@@ -148,7 +148,7 @@ def test_a_required_body_is_required_and_the_key_is_not() -> None:
         fit.Orientation,
         fit.Mean,
         fit.Quantity,
-        fit.Deviations,
+        fit.Std,
         fit.GeometryWord,
         selection.Criterion,
         selection.Parameter,

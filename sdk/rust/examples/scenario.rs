@@ -49,7 +49,7 @@ async fn curvatures_are_null_at_the_centre(client: &Client, id: &CloudId) -> Out
     let on_the_circle = answer.mean_curvatures[0].expect("the circle has a curvature");
     assert!((on_the_circle - 1.0).abs() < 1e-6, "{on_the_circle}");
     assert_eq!(answer.mean_curvatures[1], None);
-    assert_eq!(answer.degenerate[0].query, 1);
+    assert_eq!(answer.flags[0].query, 1);
     Ok(())
 }
 

@@ -61,7 +61,7 @@ impl From<MeanChoice> for Mean {
 /// The function whose level set is the surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum SurfaceChoice {
+pub enum SurfaceModelChoice {
     /// `signature`, replaced by `offset` where its gradient vanishes or, for curvatures, is weak.
     #[default]
     Auto,
@@ -71,19 +71,19 @@ pub enum SurfaceChoice {
     /// needs no derivatives of `kernel`.
     Offset,
     /// Local regressions of the height over a tangent plane, with noise.
-    Local,
+    Regression,
 }
 
 /// The function whose level surface was used at a query.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum SurfaceUsed {
+pub enum SurfaceModelUsed {
     /// The signature function: the interpolant of the constant 1.
     Signature,
     /// The interpolant of signed distances on two offset layers.
     Offset,
     /// A local regression.
-    Local,
+    Regression,
 }
 
 /// The direction of normals.
@@ -106,19 +106,19 @@ pub enum OrientationChoice {
 #[serde(rename_all = "snake_case")]
 pub enum ValuesInclude {
     /// Standard deviations, given the values.
-    Deviations,
+    Std,
 }
 
 /// Optional parts of a geometric answer.
 ///
-/// `deviations` are standard deviations. A point of the cloud is off the surface by its noise, which moved it
+/// `std` are standard deviations. A point of the cloud is off the surface by its noise, which moved it
 /// along the surface as well. Deviations at a query that is a point, and those without queries, count that
 /// too. Any other query is a place that is known exactly.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum GeometryInclude {
     /// Standard deviations.
-    Deviations,
+    Std,
     /// The normals of both sheets at sharp edges. Takes local regressions.
     EdgeNormals,
 }

@@ -147,8 +147,11 @@ pub struct Diagnostics {
     /// `landmark`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub remaining_diagonal: Option<f64>,
-    /// With the solver `landmark`, what was to be left of the diagonal at most: a millionth of the noise or
-    /// less. With `iterative`, the largest relative residual that was allowed.
+    /// Largest entry of the diagonal that the landmarks were allowed to leave, unit of the values squared: a
+    /// millionth of the noise or less. Only with the solver `landmark`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub diagonal_tolerance: Option<f64>,
+    /// Largest relative residual that was allowed. Only with the solver `iterative`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
     /// Number of iterations of conjugate gradients, with the solvers `iterative` and `landmark`.
@@ -193,7 +196,7 @@ pub struct Diagnostics {
     /// Diagnostics of the fit of the surface, in answers about values on a surface.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(no_recursion)]
-    pub geometry: Option<Box<Diagnostics>>,
+    pub surface: Option<Box<Diagnostics>>,
 }
 
 /// Number of rows of a sparse operator by how their weights were computed.
@@ -262,7 +265,7 @@ impl Diagnostics {
 
     /// Warns that neighbourhoods are too small.
     ///
-    /// `deviations` is by how many deviations values from half of a neighbourhood differ from those of all of
+    /// `std` is by how many deviations values from half of a neighbourhood differ from those of all of
     /// it.
     pub fn warn_of_unsettled(&mut self, deviations: Option<f64>) {
         let Some(deviations) = deviations else { return };
@@ -276,10 +279,10 @@ impl Diagnostics {
 
 json_members!(Diagnostics);
 
-/// The reason why a query is degenerate.
+/// The reason why a query has a flag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum DegenerateReason {
+pub enum FlagReason {
     /// The gradient of the signature function vanishes, and the offset model was not tried or failed: the
     /// entry is null.
     VanishingGradient,
@@ -306,11 +309,11 @@ pub enum DegenerateReason {
 
 /// A query where geometry has no meaning, or less accuracy than it seems.
 #[derive(Debug, Clone, Serialize, ToSchema)]
-pub struct Degenerate {
+pub struct Flag {
     /// The position of the query.
     pub query: usize,
-    /// The reason why the query is degenerate.
-    pub reason: DegenerateReason,
+    /// The reason why the query has a flag.
+    pub reason: FlagReason,
     /// |∇| of the function used at the query.
     ///
     /// Its unit is 1/length for the signature function. It is about 1 for the offset model, and 0 where that

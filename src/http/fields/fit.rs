@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use utoipa::ToSchema;
 
-use super::choices::{DuplicatePolicy, MeanChoice, SolverChoice, SurfaceChoice};
+use super::choices::{DuplicatePolicy, MeanChoice, SolverChoice, SurfaceModelChoice};
 use super::cloud_ref::CloudRef;
 use super::hyperparameters::Hyperparameters;
 use super::kernel::Kernel;
@@ -15,7 +15,7 @@ use gramian_host::wire::read::points::Points;
 /// It may come from another cloud, kernel or alpha than the values. Absent fields are taken from the request.
 #[derive(Debug, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Geometry {
+pub struct Surface {
     /// The cloud whose level surface carries the operator.
     pub cloud: Option<CloudRef>,
     /// The kernel of the signature function of the surface.
@@ -30,7 +30,7 @@ pub struct Geometry {
     /// The method that solves the linear system of the surface.
     pub solver: Option<SolverChoice>,
     /// The function whose level set is the surface.
-    pub surface: Option<SurfaceChoice>,
+    pub model: Option<SurfaceModelChoice>,
 }
 
 /// A request about a cloud.
@@ -79,12 +79,12 @@ pub struct Fit {
 
 /// Declares a request. The fields of a fit and the request's own fields are members of the same object.
 ///
-/// `with` names the field that holds the [`Geometry`] of the surface, where the request has one. `taking`
+/// `with` names the field that holds the [`Surface`] of the surface, where the request has one. `taking`
 /// adds the hyperparameters of a surface.
 macro_rules! request {
     (
         $(#[$meta:meta])*
-        pub struct $name:ident $(with $geometry:ident)? $(taking $hyperparameters:ident)? {
+        pub struct $name:ident $(with $surface:ident)? $(taking $hyperparameters:ident)? {
             $($(#[$field_meta:meta])* pub $field:ident: $type:ty,)*
         }
     ) => {
@@ -150,7 +150,7 @@ macro_rules! request {
             }
 
             $(fn surface_cloud(&self) -> Option<&$crate::http::fields::CloudRef> {
-                self.$geometry.as_ref()?.cloud.as_ref()
+                self.$surface.as_ref()?.cloud.as_ref()
             })?
         }
 

@@ -11,15 +11,14 @@ pub mod limits;
 pub mod schemas;
 
 pub use choices::{
-    DuplicatePolicy, GeometryInclude, MeanChoice, OrientationChoice, SolverChoice, SurfaceChoice,
-    SurfaceUsed, ValuesInclude,
+    DuplicatePolicy, GeometryInclude, MeanChoice, OrientationChoice, SolverChoice, SurfaceModelChoice,
+    SurfaceModelUsed, ValuesInclude,
 };
 pub use cloud_ref::CloudRef;
 pub use diagnostics::{
-    Degenerate, DegenerateReason, Diagnostics, FactorizationUsed, SolverUsed, StencilsUsed, Warning,
-    WarningCode,
+    Diagnostics, FactorizationUsed, Flag, FlagReason, SolverUsed, StencilsUsed, Warning, WarningCode,
 };
 pub(crate) use fit::request;
-pub use fit::{Fit, Geometry, GivenProcess, HasCloud};
+pub use fit::{Fit, GivenProcess, HasCloud, Surface};
 pub use hyperparameters::{Hyperparameters, MeansLevel, NoiseRatio};
 pub use kernel::{Kernel, KernelFamily, KernelUsed};

@@ -41,7 +41,7 @@ const MAX_POINT_INDICES: usize = 1000;
 /// Seconds to wait after an allocation failed. Factorizations in progress have ended by then.
 const RETRY_AFTER_MEMORY_SECONDS: u64 = 60;
 
-/// Pointers to the parts of a fit in the request. Parts that `geometry` leaves out are elsewhere in the
+/// Pointers to the parts of a fit in the request. Parts that `surface` leaves out are elsewhere in the
 /// request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pointers {
@@ -207,9 +207,9 @@ mod tests {
         let error = NumericsError::RaggedPoints { point: 17, expected: 3, found: 2 };
         let problem = from_numerics(error.clone(), Pointers::REQUEST);
         assert_eq!(problem.fields()[0].pointer, "/cloud/points/17");
-        let elsewhere = Pointers { points: "/geometry/cloud/points", ..Pointers::REQUEST };
+        let elsewhere = Pointers { points: "/surface/cloud/points", ..Pointers::REQUEST };
         let problem = from_numerics(error.clone(), elsewhere);
-        assert_eq!(problem.fields()[0].pointer, "/geometry/cloud/points/17");
+        assert_eq!(problem.fields()[0].pointer, "/surface/cloud/points/17");
         let by_id = Pointers { points: "/cloud/id", ..Pointers::REQUEST };
         assert_eq!(from_numerics(error, by_id).fields()[0].pointer, "/cloud/id");
     }

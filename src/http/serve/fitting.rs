@@ -177,7 +177,7 @@ impl Fitting<'_> {
         match self.app.prepared.get_or_prepare(plan.key, memory, begin).await {
             Ok(Some((stored, outcome))) => {
                 if matches!(outcome, CacheOutcome::Stored | CacheOutcome::NotStored) {
-                    self.app.solvers.with_label_values(&[stored.kind()]).inc();
+                    self.app.solvers.with_label_values(&stored.labels()).inc();
                     factors::keep(self.app, plan, &stored);
                 }
                 let is_read = stored.is_restored() && outcome != CacheOutcome::Hit;

@@ -13,12 +13,14 @@ use crate::memory::Memory;
 use crate::store::clouds::CloudStore;
 use crate::store::key::CloudId;
 use crate::store::learned::LearnedStore;
-use crate::store::prepared::{PreparedBytes, PreparedStore};
+use crate::store::prepared::{PreparedBytes, PreparedStore, labels};
 use axum::http::HeaderName;
 use gramian_host::memory::Owner;
 use gramian_host::memory::budget::Reservation;
 use gramian_host::state::host::{Guest, Host, StartError, Subject};
 use gramian_numerics::error::NumericsError;
+use gramian_numerics::model::kind::ModelKind;
+use strum::VariantArray;
 
 /// Header with the id of the cloud that a request is about. Proxies route all requests about one cloud to one
 /// replica.
@@ -82,11 +84,11 @@ impl App {
         let host = Host::new(config.host.clone(), guest, in_store)?;
         let solvers = host.metrics.counters(
             "gramian_solvers_prepared_total",
-            "Solvers prepared, by kind",
-            &["kind"],
+            "Solvers prepared, by kind and by what they serve",
+            &["kind", "of"],
         )?;
-        for kind in ["dense", "pivoted", "moving", "local", "restored"] {
-            solvers.with_label_values(&[kind]);
+        for kind in ModelKind::VARIANTS.iter().copied().map(Some).chain([None]) {
+            solvers.with_label_values(&labels(kind));
         }
         let of_prepared = PreparedBytes { kept: memory.cache, spare: memory.spare };
         Ok(Arc::new(Self {

@@ -174,7 +174,7 @@ fn members_of_answers_stay_and_may_grow() {
     let rank = property("/components/schemas/Diagnostics", "rank");
     assert_eq!(remove(&rank, "minimum"), [format!("{rank}/minimum")]);
     assert_eq!(set(&rank, "minimum", json!(1)), NOTHING);
-    let surfaces = "/components/schemas/SurfaceUsed/enum";
+    let surfaces = "/components/schemas/SurfaceModelUsed/enum";
     assert_eq!(push(surfaces, json!("plane")), [surfaces]);
     assert_eq!(take(surfaces, "offset"), NOTHING);
 }
@@ -182,11 +182,11 @@ fn members_of_answers_stay_and_may_grow() {
 #[test]
 fn members_of_requests_stay_and_stay_optional() {
     let (properties, required) = (format!("{REQUEST}/properties"), format!("{REQUEST}/required"));
-    assert_eq!(remove(&properties, "surface"), [property(REQUEST, "surface")]);
-    assert_eq!(push(&required, json!("surface")), [property(REQUEST, "surface")]);
+    assert_eq!(remove(&properties, "surface_model"), [property(REQUEST, "surface_model")]);
+    assert_eq!(push(&required, json!("surface_model")), [property(REQUEST, "surface_model")]);
     assert_eq!(take(&required, "cloud"), NOTHING);
     assert_eq!(set(&properties, "radius", json!({"type": "number"})), NOTHING);
-    let surfaces = "/components/schemas/SurfaceChoice/enum";
+    let surfaces = "/components/schemas/SurfaceModelChoice/enum";
     assert_eq!(take(surfaces, "offset"), [surfaces]);
     assert_eq!(push(surfaces, json!("plane")), NOTHING);
     assert_eq!(remove(REQUEST, "additionalProperties"), NOTHING);
@@ -273,8 +273,8 @@ fn additions_and_words_are_compatible() {
     assert_eq!(set("/components/schemas", "Spectrum", json!({"type": "object"})), NOTHING);
     // The same schema, written inline where it is used.
     let inline = broken(|document| {
-        let schema = at(document, "/components/schemas/SurfaceUsed").clone();
-        *at(document, &format!("{}/items", property(ANSWER, "surfaces"))) = schema;
+        let schema = at(document, "/components/schemas/SurfaceModelUsed").clone();
+        *at(document, &format!("{}/items", property(ANSWER, "surface_models"))) = schema;
     });
     assert_eq!(inline, NOTHING);
 }

@@ -34,7 +34,7 @@ use crate::error::Result;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::points::neighbours::Neighbours;
-use crate::surface::degeneracy::Resolution;
+use crate::surface::flags::Resolution;
 use crate::surface::geometry::Geometry;
 use assembly::{Assembly, Rows};
 pub use row::RowKind;

@@ -3,7 +3,7 @@
 use super::super::Operator;
 use super::super::resolution::resolution;
 use super::disc::{Disc, Site};
-use crate::surface::degeneracy::Resolution;
+use crate::surface::flags::Resolution;
 
 /// Origin of the weights of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -16,6 +16,9 @@ const ROUNDING: f64 = 64.0;
 /// Draws computed at once.
 const DRAWS_PER_BLOCK: usize = 256;
 
+/// Bit that tells the random numbers of the noise from those of the function.
+const NOISE_STREAM: u64 = 1 << 63;
+
 /// Identity of a sequence of draws: a seed, and which of several lists of values the draws are for.
 #[derive(Debug, Clone, Copy)]
 pub struct Stream {
@@ -28,6 +31,8 @@ pub struct Root {
     /// The r independent directions, `[r, m]` row by row.
     directions: Vec<f64>,
     n_queries: usize,
+    /// Standard deviation of independent noise at each query.
+    noise_deviation: f64,
 }
 
 impl Root {
@@ -45,7 +50,7 @@ impl Root {
         let rounding = ROUNDING * f64::EPSILON * m as f64 * prior_variance;
         // If no variance is above rounding, there is nothing to factorize. NaN goes on to the next check.
         if covariance.latent.iter().step_by(m + 1).all(|variance| *variance <= rounding) {
-            return Ok(Self { directions: Vec::new(), n_queries: m });
+            return Ok(Self { directions: Vec::new(), n_queries: m, noise_deviation: 0.0 });
         }
         if covariance.latent.iter().any(|entry| !entry.is_finite()) {
             return Err(NumericsError::WeightsOverflow);
@@ -56,7 +61,12 @@ impl Root {
         for (column, direction) in directions.chunks_exact_mut(m).enumerate() {
             (column..m).for_each(|row| direction[order[row]] = factor[column * m + row]);
         }
-        Ok(Self { directions, n_queries: m })
+        Ok(Self { directions, n_queries: m, noise_deviation: 0.0 })
+    }
+
+    /// Adds independent noise of this variance at each query: draws are then of observations.
+    pub fn with_noise(self, variance: f64) -> Self {
+        Self { noise_deviation: variance.sqrt(), ..self }
     }
 
     /// Draws `[count, m]` about means `[m]`.
@@ -87,8 +97,21 @@ impl Root {
             let out = MatMut::from_column_major_slice_mut(draws, m, count);
             let normals = MatRef::from_column_major_slice(normals, rank, count);
             matmul(out, Accum::Add, directions, normals, 1.0, parallelism((2 * m * rank * count) as f64));
+            if self.noise_deviation > 0.0 {
+                self.add_noise(draws, first, stream);
+            }
         }
         Ok(draws)
+    }
+
+    /// Adds noise to draws `[count, m]` of a stream from this index on.
+    fn add_noise(&self, draws: &mut [f64], first: usize, stream: Stream) {
+        let mut noise = vec![0.0; self.n_queries];
+        for (at, draw) in draws.chunks_exact_mut(self.n_queries).enumerate() {
+            let index = NOISE_STREAM ^ (stream.list << 32) ^ (first + at) as u64;
+            Random::of(stream.seed, index).fill_normal(&mut noise);
+            draw.iter_mut().zip(&noise).for_each(|(value, z)| *value += self.noise_deviation * z);
+        }
     }
 }
 

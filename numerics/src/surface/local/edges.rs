@@ -131,7 +131,7 @@ impl Points<'_> {
         let own = Extrapolation {
             normal: queries.geometry.normals[query * d..][..d].into(),
             height: 0.0,
-            normal_deviation: queries.geometry.normal_deviations[query],
+            normal_deviation: queries.geometry.normal_std[query],
             height_deviation: (queries.noise)(query) / spacing,
         };
         let first = Sheet::of(&sheets, d, |other| own.agrees(other));
@@ -153,8 +153,8 @@ impl Points<'_> {
             return None;
         }
         let height = of.heights[point] + dot(normal, &arm) + 0.5 * dot(&turn, &arm);
-        let normal_deviation = of.normal_deviations[point];
-        let height_deviation = of.height_deviations[point].hypot(normal_deviation * norm(&arm));
+        let normal_deviation = of.normal_std[point];
+        let height_deviation = of.height_std[point].hypot(normal_deviation * norm(&arm));
         let normal = unit(normal.iter().zip(&turn).map(|(n, t)| n + t).collect());
         Some(Extrapolation {
             normal,

@@ -52,8 +52,8 @@ impl PatchGeometry {
             shapes: ordered.given_rows(&self.shapes, d * d),
             is_at_rim: ordered.given_rows(&self.is_at_rim, 1),
             heights: ordered.given_rows(&self.heights, 1),
-            height_deviations: ordered.given_rows(&self.height_deviations, 1),
-            normal_deviations: ordered.given_rows(&self.normal_deviations, 1),
+            height_std: ordered.given_rows(&self.height_std, 1),
+            normal_std: ordered.given_rows(&self.normal_std, 1),
             curvatures,
         }
     }
@@ -61,7 +61,7 @@ impl PatchGeometry {
     /// Bytes held on the heap.
     pub(super) fn n_bytes(&self) -> usize {
         let vectors = [&self.normals, &self.shapes];
-        let numbers = [&self.heights, &self.height_deviations, &self.normal_deviations];
+        let numbers = [&self.heights, &self.height_std, &self.normal_std];
         let of_curvatures = |c: &CurvatureDeviations| {
             vec_bytes(&c.principal)
                 + vec_bytes(&c.mean)

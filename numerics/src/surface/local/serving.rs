@@ -11,7 +11,7 @@ use crate::patches::{CurvatureDeviations, PatchGeometry};
 use crate::points::cloud::Cloud;
 use crate::points::neighbours::Neighbour;
 use crate::surface::NearNormals;
-use crate::surface::degeneracy::{DegeneracyReason, is_far};
+use crate::surface::flags::{FlagReason, is_far};
 use crate::surface::request::{GeometryRequest, Orientation};
 use crate::surface::served::{Deviations, Served, ServedBy, Verdict};
 
@@ -54,12 +54,12 @@ impl LocalSurface {
         let mut edges = points.edges_at(&asked, observer)?;
         let mut doubts = of_sides;
         for edge in &mut edges {
-            doubts[edge.query].get_or_insert(DegeneracyReason::Edge);
+            doubts[edge.query].get_or_insert(FlagReason::Edge);
             edge.normals.iter_mut().for_each(|c| *c *= sign);
         }
         let verdict = |query: usize| {
             let reason = self.reason(&geometry, query, request, doubts[query]);
-            Verdict { sign, by: ServedBy::Local, reason }
+            Verdict { sign, by: ServedBy::Regression, reason }
         };
         Ok(Served {
             dimension: d,
@@ -73,20 +73,20 @@ impl LocalSurface {
     }
 
     /// Whether the sides of the given points are in doubt, `[n]`.
-    fn doubts_of_points(&self) -> Vec<Option<DegeneracyReason>> {
-        let doubt = |&is: &bool| is.then_some(DegeneracyReason::AmbiguousSide);
+    fn doubts_of_points(&self) -> Vec<Option<FlagReason>> {
+        let doubt = |&is: &bool| is.then_some(FlagReason::AmbiguousSide);
         self.ordered.given_rows(&self.is_ambiguous.iter().map(doubt).collect::<Vec<_>>(), 1)
     }
 
     /// Whether the sides of other places are in doubt, `[m]`, which they have from the nearest point.
-    fn doubts_of_sides(&self, places: &Cloud) -> Vec<Option<DegeneracyReason>> {
+    fn doubts_of_sides(&self, places: &Cloud) -> Vec<Option<FlagReason>> {
         let Placed { sampling, .. } = self.ordered();
         let doubt = |found: &mut Vec<Neighbour>, place: usize| {
             sampling.neighbours().nearest_into(places.point(place), 1, found);
             let is_near = |found: &&Neighbour| !is_far(found.squared_distance, sampling.spacing(found.point));
             match found.first().filter(is_near) {
-                None => Some(DegeneracyReason::FarFromCloud),
-                Some(found) => self.is_ambiguous[found.point].then_some(DegeneracyReason::AmbiguousSide),
+                None => Some(FlagReason::FarFromCloud),
+                Some(found) => self.is_ambiguous[found.point].then_some(FlagReason::AmbiguousSide),
             }
         };
         (0..places.n_points()).into_par_iter().map_init(Vec::new, doubt).collect()
@@ -98,16 +98,16 @@ impl LocalSurface {
         geometry: &PatchGeometry,
         query: usize,
         request: &GeometryRequest,
-        doubt: Option<DegeneracyReason>,
-    ) -> Option<DegeneracyReason> {
+        doubt: Option<FlagReason>,
+    ) -> Option<FlagReason> {
         if !geometry.is_known[query] {
-            return Some(DegeneracyReason::VanishingGradient);
+            return Some(FlagReason::VanishingGradient);
         }
         let is_resolved = match request.checks_curvatures {
             true => self.is_resolved(geometry, query),
-            false => geometry.normal_deviations[query] <= UNCERTAIN_NORMAL,
+            false => geometry.normal_std[query] <= UNCERTAIN_NORMAL,
         };
-        doubt.or_else(|| (!is_resolved).then_some(DegeneracyReason::UnderResolved))
+        doubt.or_else(|| (!is_resolved).then_some(FlagReason::UnderResolved))
     }
 
     /// Returns whether the curvatures are known well enough to be used: to a part of their size, or to be
@@ -138,8 +138,8 @@ fn deviations(geometry: &PatchGeometry, sign: f64, d: usize) -> Deviations {
     }
     Deviations {
         is_known: geometry.is_known.clone(),
-        height: geometry.height_deviations.clone(),
-        normal: geometry.normal_deviations.clone(),
+        height: geometry.height_std.clone(),
+        normal: geometry.normal_std.clone(),
         principal,
         mean: curvatures.mean.clone(),
         gaussian: curvatures.gaussian.clone(),

@@ -55,8 +55,8 @@ pub(super) fn deviations(
         let with = |deviation: f64, a: f64, b: f64| (deviation * deviation + (a - b) * (a - b)).sqrt();
         let angle = (1.0 - cosine * cosine).max(0.0).sqrt().asin();
         found.is_known[query] = true;
-        found.height[query] = with(local.height_deviations[query], local.heights[query], 0.0);
-        found.normal[query] = with(local.normal_deviations[query], angle, 0.0);
+        found.height[query] = with(local.height_std[query], local.heights[query], 0.0);
+        found.normal[query] = with(local.normal_std[query], angle, 0.0);
         for i in 0..k {
             found.principal[query * k + i] = with(of_principal[i], curvatures[i], others[i]);
         }

@@ -10,7 +10,7 @@ use crate::points::cloud::Cloud;
 use crate::points::local_quadrics::LocalQuadrics;
 use crate::points::sampling::Sampling;
 use crate::regression::sums::jets::{JetOrder, Jets};
-use crate::surface::degeneracy::lacks_normal;
+use crate::surface::flags::lacks_normal;
 
 /// Step of the difference quotient along a local normal, in spacings, for kernels without a gradient at the
 /// points.

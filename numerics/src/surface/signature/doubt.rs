@@ -60,7 +60,7 @@ pub(super) fn uncertain<'a>(
             });
         }
         let cosine = (dot(gradient, &local.normals[at * d..][..d]) / norm(gradient)).abs().min(1.0);
-        let is_certain = local.normal_deviations[at].hypot(cosine.acos()) <= UNCERTAIN;
+        let is_certain = local.normal_std[at].hypot(cosine.acos()) <= UNCERTAIN;
         !is_certain
     };
     let uncertain = doubtful.iter().enumerate().filter(|&(at, &query)| is_uncertain(at, query));

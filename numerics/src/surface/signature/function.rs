@@ -8,7 +8,7 @@ use crate::observer::Observer;
 use crate::regression::function::interpolant::Interpolant;
 use crate::regression::solver::{Solution, Solver, Sought};
 use crate::regression::sums::jets::{JetOrder, Jets};
-use crate::surface::degeneracy::roundings;
+use crate::surface::flags::roundings;
 
 /// The paper's signature function u_X, the fit of the constant 1, with its values and derivatives at the
 /// points.

@@ -12,7 +12,7 @@ mod serving;
 use std::sync::{Arc, OnceLock};
 
 use super::NearNormals;
-use super::degeneracy::is_too_rough;
+use super::flags::is_too_rough;
 use crate::error::{NumericsError, Result};
 use crate::machine::heap::{arc_payload, block_bytes, vec_bytes};
 use crate::machine::vector::dot;

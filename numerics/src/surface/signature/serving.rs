@@ -20,7 +20,7 @@ use crate::points::neighbours::Neighbour;
 use crate::points::quadric::n_quadric_neighbours;
 use crate::regression::sums::jets::{JetOrder, Jets};
 use crate::surface::curvature::principal_curvatures;
-use crate::surface::degeneracy::{DegeneracyReason, is_far, is_weak, lacks_normal, roundings};
+use crate::surface::flags::{FlagReason, is_far, is_weak, lacks_normal, roundings};
 use crate::surface::request::{GeometryRequest, Orientation, SurfaceModel};
 use crate::surface::served::{Served, ServedBy, Verdict};
 
@@ -40,7 +40,7 @@ pub(crate) fn serve(
 ) -> Result<Served> {
     let order = match request.model {
         SurfaceModel::Offset => JetOrder::Value,
-        SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Local => JetOrder::Hessian,
+        SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Regression => JetOrder::Hessian,
     };
     let are_points = queries == surface.cloud();
     let jets = match surface.signature.jets() {
@@ -152,9 +152,7 @@ impl Service<'_> {
                 let (site, mut slot) = (self.site(query), Slot { gradient, hessian, found });
                 *verdict = match (needs_offset[query], query < first_unaffordable) {
                     (true, true) => self.by_offset(&site, &mut slot),
-                    (true, false) => {
-                        self.without_offset(&site, DegeneracyReason::UnaffordableRescue, &mut slot)
-                    }
+                    (true, false) => self.without_offset(&site, FlagReason::UnaffordableRescue, &mut slot),
                     (false, _) => self.by_signature(&site, &mut slot),
                 };
                 verdict.reason = verdict.reason.or_else(|| self.flag(*verdict, &slot, &site));
@@ -178,7 +176,7 @@ impl Service<'_> {
         };
         let doubtful: Vec<usize> = (0..self.queries.n_points()).filter(is_doubtful).collect();
         for query in uncertain(self.surface, self.queries, &doubtful, served, quadric, observer)? {
-            served.verdicts[query].reason = Some(DegeneracyReason::UnderResolved);
+            served.verdicts[query].reason = Some(FlagReason::UnderResolved);
         }
         Ok(())
     }
@@ -205,7 +203,7 @@ impl Service<'_> {
 
     fn needs_offset(&self, site: &Site<'_>) -> bool {
         match self.request.model {
-            SurfaceModel::Signature | SurfaceModel::Local => false,
+            SurfaceModel::Signature | SurfaceModel::Regression => false,
             SurfaceModel::Offset => true,
             SurfaceModel::Auto => self.vanishes(site) || self.is_weak(site),
         }
@@ -232,7 +230,7 @@ impl Service<'_> {
 
     fn by_signature(&self, site: &Site<'_>, slot: &mut Slot<'_>) -> Verdict {
         if self.request.model == SurfaceModel::Signature && self.vanishes(site) {
-            return self.null(site, DegeneracyReason::VanishingGradient, slot);
+            return self.null(site, FlagReason::VanishingGradient, slot);
         }
         slot.gradient.copy_from_slice(self.jets.gradient(site.query));
         slot.hessian.copy_from_slice(&self.jets.hessian(site.query));
@@ -246,7 +244,7 @@ impl Service<'_> {
     /// Serves a query by the offset model, whose gradient points outward.
     fn by_offset(&self, site: &Site<'_>, slot: &mut Slot<'_>) -> Verdict {
         let Some(jet) = offset_jet_at(self.surface, site.x) else {
-            return self.without_offset(site, DegeneracyReason::VanishingGradient, slot);
+            return self.without_offset(site, FlagReason::VanishingGradient, slot);
         };
         slot.take(&jet);
         let sign = match self.request.orientation {
@@ -257,7 +255,7 @@ impl Service<'_> {
     }
 
     /// Serves a query without the offset model. A weak gradient is better than nothing.
-    fn without_offset(&self, site: &Site<'_>, reason: DegeneracyReason, slot: &mut Slot<'_>) -> Verdict {
+    fn without_offset(&self, site: &Site<'_>, reason: FlagReason, slot: &mut Slot<'_>) -> Verdict {
         if self.request.model == SurfaceModel::Auto && !self.vanishes(site) {
             self.by_signature(site, slot)
         } else {
@@ -265,10 +263,10 @@ impl Service<'_> {
         }
     }
 
-    fn null(&self, site: &Site<'_>, reason: DegeneracyReason, slot: &mut Slot<'_>) -> Verdict {
+    fn null(&self, site: &Site<'_>, reason: FlagReason, slot: &mut Slot<'_>) -> Verdict {
         let by = match self.request.model {
             SurfaceModel::Offset => ServedBy::Offset,
-            SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Local => {
+            SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Regression => {
                 slot.gradient.copy_from_slice(self.jets.gradient(site.query));
                 slot.hessian.copy_from_slice(&self.jets.hessian(site.query));
                 ServedBy::Signature
@@ -278,21 +276,21 @@ impl Service<'_> {
     }
 
     /// Returns the reason why an answer is doubtful.
-    fn flag(&self, verdict: Verdict, slot: &Slot<'_>, site: &Site<'_>) -> Option<DegeneracyReason> {
+    fn flag(&self, verdict: Verdict, slot: &Slot<'_>, site: &Site<'_>) -> Option<FlagReason> {
         if is_far(site.nearest.squared_distance, site.spacing) {
-            return Some(DegeneracyReason::FarFromCloud);
+            return Some(FlagReason::FarFromCloud);
         }
         let has_side = self.request.orientation == Orientation::Outward;
         if has_side && self.surface.oriented.is_ambiguous[site.nearest.point] {
-            return Some(DegeneracyReason::AmbiguousSide);
+            return Some(FlagReason::AmbiguousSide);
         }
         if !self.request.checks_curvatures {
             return None;
         }
         if verdict.by == ServedBy::Signature && self.surface.is_too_rough {
-            return Some(DegeneracyReason::KernelTooRough);
+            return Some(FlagReason::KernelTooRough);
         }
-        (!self.is_resolved(verdict, slot, site)).then_some(DegeneracyReason::UnderResolved)
+        (!self.is_resolved(verdict, slot, site)).then_some(FlagReason::UnderResolved)
     }
 
     fn is_resolved(&self, verdict: Verdict, slot: &Slot<'_>, site: &Site<'_>) -> bool {

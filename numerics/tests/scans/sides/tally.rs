@@ -6,7 +6,7 @@ use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::surface::Surface;
-use gramian_numerics::surface::degeneracy::{Degeneracy, DegeneracyReason};
+use gramian_numerics::surface::flags::{Flag, FlagReason};
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
 use gramian_numerics::surface::local::{Given, LocalSurface};
 
@@ -49,8 +49,8 @@ impl SideTally {
         let geometry = Geometry::of(surface, &sided.cloud, &NORMALS, &Unobserved).unwrap();
         let (n, d) = (sided.cloud.n_points(), sided.cloud.dimension());
         let mut is_flagged = vec![false; n];
-        geometry.degenerate().iter().for_each(|entry| is_flagged[entry.query] = true);
-        let is_ambiguous = |entry: &&Degeneracy| entry.reason == DegeneracyReason::AmbiguousSide;
+        geometry.flags().iter().for_each(|entry| is_flagged[entry.query] = true);
+        let is_ambiguous = |entry: &&Flag| entry.reason == FlagReason::AmbiguousSide;
         let along = |point: usize| -> f64 {
             let truth = &sided.normals[point * d..][..d];
             geometry.normal(point).iter().zip(truth).map(|(a, b)| a * b).sum()
@@ -60,9 +60,9 @@ impl SideTally {
             n_points: n,
             n_flipped: flipped.len(),
             n_flipped_unflagged: flipped.iter().filter(|&&point| !is_flagged[point]).count(),
-            n_flagged: geometry.degenerate().len(),
+            n_flagged: geometry.flags().len(),
             n_off_unflagged: (0..n).filter(|&point| !is_flagged[point] && along(point).abs() < OFF).count(),
-            n_ambiguous: geometry.degenerate().iter().filter(is_ambiguous).count(),
+            n_ambiguous: geometry.flags().iter().filter(is_ambiguous).count(),
         }
     }
 

@@ -35,7 +35,7 @@ from .answers import (
     SurfaceGradientMatrix,
     SurfaceGradientSparseMatrix,
 )
-from .arguments.fit import Fit, Geometry, GeometryFields, GeometryLike, Kernel, KernelFields, KernelLike, ValuesFit
+from .arguments.fit import Fit, Surface, SurfaceFields, SurfaceLike, Kernel, KernelFields, KernelLike, ValuesFit
 from .arguments.options import (
     InterpolationOptions,
     MeshOptions,
@@ -50,8 +50,8 @@ from .client import Client
 from .resources.cloud import Cloud
 from .resources.selection import Bounds, FreeParameterFields, Vary
 from .rest.models import (
-    Degenerate,
-    DegenerateReason,
+    Flag,
+    FlagReason,
     Diagnostics,
     DuplicatePolicy,
     FactorizationUsed,
@@ -71,8 +71,8 @@ from .rest.models import (
     Smoothness,
     SolverChoice,
     SolverUsed,
-    SurfaceChoice,
-    SurfaceUsed,
+    SurfaceModelChoice,
+    SurfaceModelUsed,
     WarningCode,
 )
 from .rest.types import UNSET, Unset
@@ -90,8 +90,8 @@ __all__ = [
     "Client",
     "Cloud",
     "Curvatures",
-    "Degenerate",
-    "DegenerateReason",
+    "Flag",
+    "FlagReason",
     "Diagnostics",
     "DuplicatePolicy",
     "FactorizationUsed",
@@ -99,10 +99,10 @@ __all__ = [
     "Fit",
     "FreeParameter",
     "FreeParameterFields",
-    "Geometry",
-    "GeometryFields",
+    "Surface",
+    "SurfaceFields",
     "GeometryInclude",
-    "GeometryLike",
+    "SurfaceLike",
     "Interpolation",
     "InterpolationBatch",
     "InterpolationOptions",
@@ -138,14 +138,14 @@ __all__ = [
     "Smoothness",
     "SolverChoice",
     "SolverUsed",
-    "SurfaceChoice",
+    "SurfaceModelChoice",
     "SurfaceFit",
     "SurfaceGradient",
     "SurfaceGradientMatrix",
     "SurfaceGradientSparseMatrix",
     "SurfaceOperatorFit",
     "SurfaceOptions",
-    "SurfaceUsed",
+    "SurfaceModelUsed",
     "UnknownCloud",
     "Unset",
     "ValuesFit",

@@ -175,7 +175,7 @@ class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
         if return_std and return_cov:
             raise RuntimeError("At most one of return_std or return_cov can be requested.")
         if return_std:
-            answers = self._posteriors(X, "variance")
+            answers = self._posteriors(X, "variances")
             return _stacked(answers, "means"), np.sqrt(_stacked(answers, "variances"))
         if return_cov:
             answers = self._posteriors(X, "covariance")

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::http::fields::{Fit, GeometryInclude, OrientationChoice, SurfaceChoice};
+use crate::http::fields::{Fit, GeometryInclude, OrientationChoice, SurfaceModelChoice};
 use crate::http::problem::Problem;
 use crate::http::problem::catalogue;
 use crate::http::serve::operation::Plan;
@@ -49,7 +49,7 @@ pub fn plan_geometry(
 
 /// Translates the options of a request into options of the numerics, with defaults for absent ones.
 pub fn geometry_request(
-    surface: Option<SurfaceChoice>,
+    surface: Option<SurfaceModelChoice>,
     orientation: Option<OrientationChoice>,
     checks_curvatures: bool,
     include: Option<&[GeometryInclude]>,
@@ -61,14 +61,14 @@ pub fn geometry_request(
             OrientationChoice::Gradient => Orientation::Gradient,
         },
         model: match surface.unwrap_or_default() {
-            SurfaceChoice::Auto => SurfaceModel::Auto,
-            SurfaceChoice::Signature => SurfaceModel::Signature,
-            SurfaceChoice::Offset => SurfaceModel::Offset,
-            SurfaceChoice::Local => SurfaceModel::Local,
+            SurfaceModelChoice::Auto => SurfaceModel::Auto,
+            SurfaceModelChoice::Signature => SurfaceModel::Signature,
+            SurfaceModelChoice::Offset => SurfaceModel::Offset,
+            SurfaceModelChoice::Regression => SurfaceModel::Regression,
         },
         checks_curvatures,
         max_offsets: MAX_OFFSETS,
-        has_deviations: has(GeometryInclude::Deviations),
+        has_deviations: has(GeometryInclude::Std),
         has_edge_normals: has(GeometryInclude::EdgeNormals),
     }
 }
@@ -77,8 +77,10 @@ pub fn geometry_request(
 pub fn asked_of(request: &GeometryRequest, surface: &PlannedSurface, queries: &Cloud) -> AskedOfSurface {
     let offsets = match (request.model, request.checks_curvatures) {
         (SurfaceModel::Offset, _) => Offsets::Everywhere,
-        (SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Local, true) => Offsets::Confirmations,
-        (SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Local, false) => Offsets::Rescues,
+        (SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Regression, true) => {
+            Offsets::Confirmations
+        }
+        (SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Regression, false) => Offsets::Rescues,
     };
     let are_points = *queries == *surface.on.stored.cloud;
     AskedOfSurface {

@@ -2,7 +2,7 @@
 
 use super::common::{GeometryWork, geometry_request, plan_geometry};
 use crate::http::fields::{
-    Degenerate, Diagnostics, GeometryInclude, OrientationChoice, SurfaceChoice, SurfaceUsed, request,
+    Diagnostics, Flag, GeometryInclude, OrientationChoice, SurfaceModelChoice, SurfaceModelUsed, request,
 };
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
@@ -25,7 +25,7 @@ request! {
         #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The function whose level set is the surface. Default: `auto`.
-        pub surface: Option<SurfaceChoice>,
+        pub surface_model: Option<SurfaceModelChoice>,
         /// The direction of normals, which determines the sign of curvatures. Default: `outward`.
         pub orientation: Option<OrientationChoice>,
         /// Optional parts of the answer. Default: none.
@@ -49,29 +49,29 @@ answer! {
         gaussian_curvatures: Array as Vec<Option<f64>>,
         /// The normal at each query, of length 1. Null where there is none.
         normals: Array as Vec<Option<Vec<f64>>>,
-        /// |∇u| at each query for the function in `surfaces`: unit 1/length for `signature`, about 1 for
+        /// |∇u| at each query for the function in `surface_models`: unit 1/length for `signature`, about 1 for
         /// `offset`.
         gradient_norms: Array as Vec<f64>,
         /// The signature function at each query: 1 on the surface, usually more inside a closed one.
         levels: Array as Vec<f64>,
         /// The function whose level surface was used at each query. It is `signature` where there is no
         /// answer.
-        surfaces: Vec<SurfaceUsed>,
+        surface_models: Vec<SurfaceModelUsed>,
         /// Standard deviation of the angle of the normal at each query, radians.
         ///
         /// 95 % of the angles lie within 1.96 standard deviations. Null where there is no answer or the
         /// deviation is not known.
-        normal_deviations: Option<Array> as Option<Vec<Option<f64>>>,
+        normal_std: Option<Array> as Option<Vec<Option<f64>>>,
         /// Standard deviations of the principal curvatures at each query, in their order, 1/length.
-        principal_curvature_deviations: Option<Array> as Option<Vec<Option<Vec<f64>>>>,
+        principal_curvature_std: Option<Array> as Option<Vec<Option<Vec<f64>>>>,
         /// Standard deviations of the mean curvatures, 1/length.
-        mean_curvature_deviations: Option<Array> as Option<Vec<Option<f64>>>,
+        mean_curvature_std: Option<Array> as Option<Vec<Option<f64>>>,
         /// Standard deviations of the Gaussian curvatures, 1/length to the d − 1.
-        gaussian_curvature_deviations: Option<Array> as Option<Vec<Option<f64>>>,
+        gaussian_curvature_std: Option<Array> as Option<Vec<Option<f64>>>,
         /// The normals of the two sheets that meet at each query, if it is at a sharp edge. Null elsewhere.
         edge_normals: Option<Array> as Option<Vec<Option<Vec<Vec<f64>>>>>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
-        degenerate: Vec<Degenerate>,
+        flags: Vec<Flag>,
         /// The numbers used, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
         /// The queries, for model/ply.
@@ -88,7 +88,7 @@ operation! {
 /// function u, where P projects onto the tangent space and σ = ±1 is such that σ∇u points along the normal. A
 /// sphere of radius r has curvatures +1/r with outward normals. Where ∇u vanishes or is too small to be
 /// trusted, the nearest points and copies shifted by ±δ along their normals are interpolated instead (the
-/// offset model). An entry that disagrees with the points around its query is listed in `degenerate`.
+/// offset model). An entry that disagrees with the points around its query is listed in `flags`.
 pub async fn compute_curvatures(CurvaturesRequest) -> CurvaturesResponse;
 path: "/v1/curvatures", tag: "geometry", answer: "Curvatures at the queries"
 }
@@ -99,7 +99,7 @@ impl Operation for CurvaturesRequest {
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<GeometryWork>, Problem> {
         let fit = self.take_fit();
-        let request = geometry_request(self.surface, self.orientation, true, self.include.as_deref());
+        let request = geometry_request(self.surface_model, self.orientation, true, self.include.as_deref());
         plan_geometry(planner, fit, self.queries, request, Purpose::Curvatures, |d| d * d + 2 * d + 5)
     }
 
@@ -126,13 +126,13 @@ impl Operation for CurvaturesRequest {
             normals: surface.per_query(geometry.normals().to_vec(), &[m, d]),
             gradient_norms: Array::new(geometry.gradient_norms().to_vec(), &[m]),
             levels: Array::new(geometry.levels().to_vec(), &[m]),
-            surfaces: surface.surfaces(),
+            surface_models: surface.surface_models(),
             edge_normals: surface.edge_normals(),
-            degenerate: surface.degenerate(),
-            normal_deviations: normal,
-            principal_curvature_deviations: principal,
-            mean_curvature_deviations: mean,
-            gaussian_curvature_deviations: gaussian,
+            flags: surface.flags(),
+            normal_std: normal,
+            principal_curvature_std: principal,
+            mean_curvature_std: mean,
+            gaussian_curvature_std: gaussian,
             diagnostics: surface.diagnostics(fits),
             shape: shape_of_points(work.queries),
         })

@@ -1,6 +1,6 @@
 //! Flags for doubtful answers of operators on values.
 
-use crate::http::fields::Degenerate;
+use crate::http::fields::Flag;
 use crate::http::problem::Problem;
 use crate::http::serve::answers::surface::SurfaceGeometry;
 use crate::http::serve::fitted::Fits;
@@ -24,18 +24,18 @@ pub struct Doubted<'a> {
 ///
 /// # Errors
 /// 503 or 504 if the computation is cancelled because nobody waits for it any more.
-pub fn degenerate(
+pub fn flags(
     doubted: Doubted<'_>,
     fits: &Fits,
     surface: &SurfaceGeometry,
     observer: &JobObserver,
-) -> Result<Vec<Degenerate>, Problem> {
+) -> Result<Vec<Flag>, Problem> {
     let Doubted { operator, judged, values, deviations } = doubted;
     let refused = |error| fits.main.refused(error);
-    let mut degenerate = surface.degenerate();
+    let mut flags = surface.flags();
     if let Some(deviations) = deviations {
         let uncertain = judged.by_deviations(deviations);
-        surface.flag_uncertain(uncertain, &mut degenerate).map_err(refused)?;
+        surface.flag_uncertain(uncertain, &mut flags).map_err(refused)?;
     }
     let learned = fits.learned_beside(values, observer);
     // `Ok(None)` means that the kernel was learned, so its deviations already express what the values say.
@@ -43,7 +43,7 @@ pub fn degenerate(
         let judge =
             |learned: &Option<_>| Judged { learned: learned.as_ref(), ..judged }.judge(operator, observer);
         let uncertain = learned.and_then(|learned| judge(&learned));
-        surface.flag_uncertain(uncertain, &mut degenerate).map_err(refused)?;
+        surface.flag_uncertain(uncertain, &mut flags).map_err(refused)?;
     }
-    Ok(degenerate)
+    Ok(flags)
 }

@@ -7,7 +7,7 @@ use utoipa::ToSchema;
 use super::operator::{
     Applied, AppliedAnswer, AppliedWork, MatrixAnswer, MatrixWork, SparseAnswer, StencilWork,
 };
-use crate::http::fields::{Degenerate, Diagnostics, Fit, Geometry, MeanChoice, ValuesInclude, request};
+use crate::http::fields::{Diagnostics, Fit, Flag, MeanChoice, Surface, ValuesInclude, request};
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
@@ -25,7 +25,7 @@ const OPERATOR: Operator = Operator::LaplaceBeltrami;
 
 request! {
     /// Values on a surface, and queries at which to compute their Laplace–Beltrami operator.
-    pub struct LaplaceBeltramiRequest with geometry taking hyperparameters {
+    pub struct LaplaceBeltramiRequest with surface taking hyperparameters {
         /// The values at the points of `cloud`, in their order.
         #[schema(min_items = 1)]
         pub values: Vec<f64>,
@@ -35,7 +35,7 @@ request! {
         #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The surface, if its fit differs from that of the values.
-        pub geometry: Option<Geometry>,
+        pub surface: Option<Surface>,
         /// Optional parts of the answer. Default: none.
         pub include: Option<Vec<ValuesInclude>>,
     }
@@ -52,13 +52,13 @@ pub enum MatrixFormat {
 
 request! {
     /// A cloud of nodes on a surface, and queries for the rows of its Laplace–Beltrami matrix.
-    pub struct LaplaceBeltramiMatrixRequest with geometry taking hyperparameters {
+    pub struct LaplaceBeltramiMatrixRequest with surface taking hyperparameters {
         /// The points to compute rows for, one row of the matrix each. Default: the points of the surface's
         /// cloud.
         #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The surface, if its fit differs from that of the values.
-        pub geometry: Option<Geometry>,
+        pub surface: Option<Surface>,
         /// The mean of the functions through the values. Default: 0.
         ///
         /// With a constant mean, the matrix maps constants to exactly 0.
@@ -74,14 +74,14 @@ answer! {
     /// The Laplace–Beltrami operator of the values at the queries.
     pub struct LaplaceBeltramiResponse {
         /// Δu at each query, unit of the values per length squared. Null where there is no normal.
-        values: Array as Vec<Option<f64>>,
-        /// Standard deviation of Δu at each query. Present if `include` has `deviations`.
+        laplacians: Array as Vec<Option<f64>>,
+        /// Standard deviation of Δu at each query. Present if `include` has `std`.
         ///
         /// It comes from noise and gaps of the values and, as far as the surface has deviations, also from
         /// the surface. Null where there is no answer or no deviation.
-        value_deviations: Option<Array> as Option<Vec<Option<f64>>>,
+        laplacian_std: Option<Array> as Option<Vec<Option<f64>>>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
-        degenerate: Vec<Degenerate>,
+        flags: Vec<Flag>,
         /// The numbers used, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
     }
@@ -95,7 +95,7 @@ answer! {
         /// A row is null where there is no normal. The matrix is not symmetric in general.
         matrix: Array as Vec<Option<Vec<f64>>>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
-        degenerate: Vec<Degenerate>,
+        flags: Vec<Flag>,
         /// The numbers used, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
     }
@@ -129,8 +129,7 @@ impl Operation for LaplaceBeltramiRequest {
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<AppliedWork>, Problem> {
         let values = std::mem::take(&mut self.values);
         let fit = Fit { mean: self.mean, ..self.take_fit() };
-        let applied =
-            Applied { geometry: self.geometry, values, queries: self.queries, include: self.include };
+        let applied = Applied { surface: self.surface, values, queries: self.queries, include: self.include };
         AppliedWork::plan(planner, OPERATOR, fit, applied)
     }
 
@@ -139,9 +138,9 @@ impl Operation for LaplaceBeltramiRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<LaplaceBeltramiResponse, Problem> {
-        let AppliedAnswer { values, deviations, degenerate, diagnostics } =
+        let AppliedAnswer { values, deviations, flags, diagnostics } =
             work.apply(OPERATOR, fits, observer)?;
-        Ok(LaplaceBeltramiResponse { values, value_deviations: deviations, degenerate, diagnostics })
+        Ok(LaplaceBeltramiResponse { laplacians: values, laplacian_std: deviations, flags, diagnostics })
     }
 }
 
@@ -152,7 +151,7 @@ impl Operation for LaplaceBeltramiMatrixRequest {
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<MatrixWork>, Problem> {
         let MatrixFormat::Dense = self.format.unwrap_or_default();
         let fit = Fit { mean: self.mean, ..self.take_fit() };
-        MatrixWork::plan(planner, OPERATOR, fit, self.geometry, self.queries)
+        MatrixWork::plan(planner, OPERATOR, fit, self.surface, self.queries)
     }
 
     fn compute(
@@ -160,19 +159,19 @@ impl Operation for LaplaceBeltramiMatrixRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<LaplaceBeltramiMatrixResponse, Problem> {
-        let MatrixAnswer { matrix, degenerate, diagnostics } = work.matrix(OPERATOR, fits, observer)?;
-        Ok(LaplaceBeltramiMatrixResponse { matrix, degenerate, diagnostics })
+        let MatrixAnswer { matrix, flags, diagnostics } = work.matrix(OPERATOR, fits, observer)?;
+        Ok(LaplaceBeltramiMatrixResponse { matrix, flags, diagnostics })
     }
 }
 
 request! {
     /// A cloud of nodes on a surface, and queries for the rows of its sparse Laplace–Beltrami matrix.
-    pub struct LaplaceBeltramiSparseMatrixRequest with geometry taking hyperparameters {
+    pub struct LaplaceBeltramiSparseMatrixRequest with surface taking hyperparameters {
         /// The points to compute rows for, one row of the matrix each. Default: the points of the surface.
         #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The surface, if it differs from that of the request.
-        pub geometry: Option<Geometry>,
+        pub surface: Option<Surface>,
     }
 }
 
@@ -190,7 +189,7 @@ answer! {
         /// In Python: `scipy.sparse.csr_matrix((data, indices, indptr), shape)`.
         data: Array as Vec<f64>,
         /// The queries where geometry has no meaning (an empty row), or less accuracy than it seems.
-        degenerate: Vec<Degenerate>,
+        flags: Vec<Flag>,
         /// The numbers used for the surface, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
     }
@@ -215,7 +214,7 @@ impl Operation for LaplaceBeltramiSparseMatrixRequest {
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<StencilWork>, Problem> {
         let fit = self.take_fit();
-        StencilWork::plan(planner, OPERATOR, fit, self.geometry, self.queries)
+        StencilWork::plan(planner, OPERATOR, fit, self.surface, self.queries)
     }
 
     fn compute(
@@ -223,8 +222,8 @@ impl Operation for LaplaceBeltramiSparseMatrixRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<LaplaceBeltramiSparseMatrixResponse, Problem> {
-        let SparseAnswer { shape, indptr, indices, data, degenerate, diagnostics } =
+        let SparseAnswer { shape, indptr, indices, data, flags, diagnostics } =
             work.matrix(OPERATOR, fits, observer)?;
-        Ok(LaplaceBeltramiSparseMatrixResponse { shape, indptr, indices, data, degenerate, diagnostics })
+        Ok(LaplaceBeltramiSparseMatrixResponse { shape, indptr, indices, data, flags, diagnostics })
     }
 }

@@ -2,7 +2,7 @@
 
 use super::common::{GeometryWork, geometry_request, plan_geometry};
 use crate::http::fields::{
-    Degenerate, Diagnostics, Fit, GeometryInclude, OrientationChoice, SurfaceChoice, SurfaceUsed, request,
+    Diagnostics, Fit, Flag, GeometryInclude, OrientationChoice, SurfaceModelChoice, SurfaceModelUsed, request,
 };
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
@@ -26,7 +26,7 @@ request! {
         #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The function whose level set is the surface. Default: `auto`.
-        pub surface: Option<SurfaceChoice>,
+        pub surface_model: Option<SurfaceModelChoice>,
         /// The direction of normals. Default: `outward`.
         pub orientation: Option<OrientationChoice>,
         /// Optional parts of the answer. Default: none.
@@ -45,23 +45,23 @@ answer! {
     pub struct NormalsResponse {
         /// The normal at each query, of length 1. Null where there is none.
         normals: Array as Vec<Option<Vec<f64>>>,
-        /// |∇u| at each query for the function in `surfaces`: unit 1/length for `signature`, about 1 for
+        /// |∇u| at each query for the function in `surface_models`: unit 1/length for `signature`, about 1 for
         /// `offset`.
         gradient_norms: Array as Vec<f64>,
         /// The signature function at each query: 1 on the surface, usually more inside a closed one.
         levels: Array as Vec<f64>,
         /// The function whose level surface was used at each query. It is `signature` where there is no
         /// answer.
-        surfaces: Vec<SurfaceUsed>,
+        surface_models: Vec<SurfaceModelUsed>,
         /// Standard deviation of the angle of the normal at each query, radians.
         ///
         /// 95 % of the angles lie within 1.96 standard deviations. Null where there is no answer or the
         /// deviation is not known.
-        normal_deviations: Option<Array> as Option<Vec<Option<f64>>>,
+        normal_std: Option<Array> as Option<Vec<Option<f64>>>,
         /// The normals of the two sheets that meet at each query, if it is at a sharp edge. Null elsewhere.
         edge_normals: Option<Array> as Option<Vec<Option<Vec<Vec<f64>>>>>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
-        degenerate: Vec<Degenerate>,
+        flags: Vec<Flag>,
         /// The numbers used, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
         /// The queries, for model/ply.
@@ -87,7 +87,7 @@ impl Operation for NormalsRequest {
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<GeometryWork>, Problem> {
         let fit = Fit { sites: self.sites.take(), ..self.take_fit() };
-        let request = geometry_request(self.surface, self.orientation, false, self.include.as_deref());
+        let request = geometry_request(self.surface_model, self.orientation, false, self.include.as_deref());
         plan_geometry(planner, fit, self.queries, request, Purpose::Normals, |d| d + 3)
     }
 
@@ -99,10 +99,10 @@ impl Operation for NormalsRequest {
             normals: surface.per_query(geometry.normals().to_vec(), &[m, d]),
             gradient_norms: Array::new(geometry.gradient_norms().to_vec(), &[m]),
             levels: Array::new(geometry.levels().to_vec(), &[m]),
-            surfaces: surface.surfaces(),
+            surface_models: surface.surface_models(),
             edge_normals: surface.edge_normals(),
-            degenerate: surface.degenerate(),
-            normal_deviations: surface.deviations().map(|deviations| deviations.normal),
+            flags: surface.flags(),
+            normal_std: surface.deviations().map(|deviations| deviations.normal),
             diagnostics: surface.diagnostics(fits),
             shape: shape_of_points(work.queries),
         })

@@ -3,10 +3,8 @@
 use std::sync::Arc;
 
 use super::common::{asked_of, check_is_surface, geometry_request};
-use super::doubts::{Doubted, degenerate};
-use crate::http::fields::{
-    Degenerate, Diagnostics, Fit, Geometry, OrientationChoice, StencilsUsed, ValuesInclude,
-};
+use super::doubts::{Doubted, flags};
+use crate::http::fields::{Diagnostics, Fit, Flag, OrientationChoice, StencilsUsed, Surface, ValuesInclude};
 use crate::http::problem::Problem;
 use crate::http::serve::answers::surface::SurfaceGeometry;
 use crate::http::serve::fitted::Fits;
@@ -39,7 +37,7 @@ pub struct AppliedWork {
 
 /// The parts of a request to apply an operator that are not its fit.
 pub struct Applied {
-    pub geometry: Option<Geometry>,
+    pub surface: Option<Surface>,
     pub values: Vec<f64>,
     pub queries: Option<Points>,
     pub include: Option<Vec<ValuesInclude>>,
@@ -64,14 +62,14 @@ pub struct AppliedAnswer {
     pub values: Array,
     /// Standard deviations in the shape of `values`, if they are asked for.
     pub deviations: Option<Array>,
-    pub degenerate: Vec<Degenerate>,
+    pub flags: Vec<Flag>,
     pub diagnostics: Diagnostics,
 }
 
 /// An operator as a matrix: `[m, n]`, or `[d, m, n]` with a matrix per component.
 pub struct MatrixAnswer {
     pub matrix: Array,
-    pub degenerate: Vec<Degenerate>,
+    pub flags: Vec<Flag>,
     pub diagnostics: Diagnostics,
 }
 
@@ -83,7 +81,7 @@ pub struct SparseAnswer {
     pub indices: Integers,
     /// A number per entry. For several components, a row of such numbers per component.
     pub data: Array,
-    pub degenerate: Vec<Degenerate>,
+    pub flags: Vec<Flag>,
     pub diagnostics: Diagnostics,
 }
 
@@ -98,11 +96,11 @@ impl AppliedWork {
         fit: Fit,
         applied: Applied,
     ) -> Result<Plan<Self>, Problem> {
-        let Applied { geometry, values, queries, include } = applied;
-        let has_deviations = include.is_some_and(|include| include.contains(&ValuesInclude::Deviations));
-        let request = GeometryRequest { has_deviations, ..operator_request(&geometry) };
+        let Applied { surface: given, values, queries, include } = applied;
+        let has_deviations = include.is_some_and(|include| include.contains(&ValuesInclude::Std));
+        let request = GeometryRequest { has_deviations, ..operator_request(&given) };
         let OperatorFits { mut main, values, mut surface } =
-            planner.operator_fits(fit, GivenValues::one(values), geometry, &request)?;
+            planner.operator_fits(fit, GivenValues::one(values), given, &request)?;
         check_is_surface(&main.on.stored.cloud)?;
         let queries = planner.queries(queries, &mut surface.on)?;
         main.on.pointers.queries = surface.on.pointers.queries;
@@ -174,7 +172,7 @@ struct Applying<'a> {
 struct Found {
     values: Vec<f64>,
     deviations: Option<Vec<f64>>,
-    degenerate: Vec<Degenerate>,
+    flags: Vec<Flag>,
     report: Report,
 }
 
@@ -195,9 +193,9 @@ impl Applying<'_> {
             values: &work.values.list,
             deviations: deviations.as_deref(),
         };
-        let degenerate = degenerate(doubted, fits, surface, observer)?;
+        let flags = flags(doubted, fits, surface, observer)?;
         let report = Report::of_function(&interpolant.solver, &interpolant.solution, factor);
-        Ok(self.answer(Found { values, deviations, degenerate, report }))
+        Ok(self.answer(Found { values, deviations, flags, report }))
     }
 
     fn by_kriging(&self, moving: &LocalKriging, observer: &JobObserver) -> Result<AppliedAnswer, Problem> {
@@ -209,8 +207,8 @@ impl Applying<'_> {
         let function = Kriged { moving, values: &merged, trend, factor };
         let found = operator.on_kriged(&surface.geometry, function, &work.queries, observer);
         let OfKriged { values, deviations, uncertain, n_dependent } = found.map_err(refused)?;
-        let mut degenerate = surface.degenerate();
-        surface.flag_uncertain(Ok(uncertain), &mut degenerate).map_err(refused)?;
+        let mut flags = surface.flags();
+        surface.flag_uncertain(Ok(uncertain), &mut flags).map_err(refused)?;
         let report = Report {
             trend: trend.cloned(),
             n_neighbours: moving.n_neighbours(),
@@ -218,12 +216,12 @@ impl Applying<'_> {
             ..Report::default()
         };
         let deviations = work.request.has_deviations.then_some(deviations);
-        Ok(self.answer(Found { values, deviations, degenerate, report }))
+        Ok(self.answer(Found { values, deviations, flags, report }))
     }
 
     fn answer(&self, found: Found) -> AppliedAnswer {
         let Self { work, operator, fits, surface } = self;
-        let Found { values, deviations, degenerate, report } = found;
+        let Found { values, deviations, flags, report } = found;
         let (m, d) = (work.queries.n_points(), work.queries.dimension());
         let shape = match operator {
             Operator::LaplaceBeltrami => vec![m],
@@ -231,11 +229,11 @@ impl Applying<'_> {
         };
         let mut diagnostics = fits.main.diagnostics(&report, m);
         fits.main.warn_of_poor_fit(&mut diagnostics, report.disagreement, work.request.has_deviations);
-        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)));
+        diagnostics.surface = Some(Box::new(surface.diagnostics(fits)));
         AppliedAnswer {
             values: surface.per_query(values, &shape),
             deviations: deviations.map(|deviations| surface.known_per_query(deviations, &shape)),
-            degenerate,
+            flags,
             diagnostics,
         }
     }
@@ -250,11 +248,11 @@ impl MatrixWork {
         planner: &Planner<'_>,
         operator: Operator,
         fit: Fit,
-        geometry: Option<Geometry>,
+        surface: Option<Surface>,
         queries: Option<Points>,
     ) -> Result<Plan<Self>, Problem> {
-        let request = operator_request(&geometry);
-        let (mut main, mut surface) = planner.matrix_fits(fit, geometry, &request)?;
+        let request = operator_request(&surface);
+        let (mut main, mut surface) = planner.matrix_fits(fit, surface, &request)?;
         check_is_surface(&main.on.stored.cloud)?;
         let queries = planner.queries(queries, &mut surface.on)?;
         main.on.pointers.queries = surface.on.pointers.queries;
@@ -295,7 +293,7 @@ impl MatrixWork {
         let matrix = Array::new(fits.main.unmerge(matrix), &shape);
         Ok(MatrixAnswer {
             matrix: matrix.with_nulls(axis_of_queries, geometry.is_null()),
-            degenerate: surface.degenerate(),
+            flags: surface.flags(),
             diagnostics: self.diagnostics(fits, &surface, observer)?,
         })
     }
@@ -314,7 +312,7 @@ impl MatrixWork {
         };
         let report = Report::of_function(&constant.solver, &constant.solution, 1.0);
         let mut diagnostics = fits.main.diagnostics(&report, self.queries.n_points());
-        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)));
+        diagnostics.surface = Some(Box::new(surface.diagnostics(fits)));
         Ok(diagnostics)
     }
 }
@@ -328,11 +326,11 @@ impl StencilWork {
         planner: &Planner<'_>,
         operator: Operator,
         fit: Fit,
-        geometry: Option<Geometry>,
+        surface: Option<Surface>,
         queries: Option<Points>,
     ) -> Result<Plan<Self>, Problem> {
-        let request = operator_request(&geometry);
-        let (nodes, mut main) = planner.stencils(fit, geometry, &request)?;
+        let request = operator_request(&surface);
+        let (nodes, mut main) = planner.stencils(fit, surface, &request)?;
         check_is_surface(&main.on.stored.cloud)?;
         let queries = planner.queries(queries, &mut main.on)?;
         let (m, d) = (queries.n_points(), queries.dimension());
@@ -383,7 +381,7 @@ impl StencilWork {
             indptr: Integers::new(indptr),
             indices: Integers::new(indices),
             data: Array::new(data, &of_data),
-            degenerate: surface.degenerate(),
+            flags: surface.flags(),
             diagnostics: surface.diagnostics(fits),
         })
     }
@@ -393,7 +391,7 @@ impl StencilWork {
 ///
 /// Operators use second derivatives of the surface, so curvatures are checked. They do not depend on the side
 /// that normals point to, so normals just follow the gradient.
-fn operator_request(geometry: &Option<Geometry>) -> GeometryRequest {
-    let surface = geometry.as_ref().and_then(|geometry| geometry.surface);
-    geometry_request(surface, Some(OrientationChoice::Gradient), true, None)
+fn operator_request(surface: &Option<Surface>) -> GeometryRequest {
+    let model = surface.as_ref().and_then(|surface| surface.model);
+    geometry_request(model, Some(OrientationChoice::Gradient), true, None)
 }

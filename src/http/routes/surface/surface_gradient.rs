@@ -4,7 +4,7 @@
 use super::operator::{
     Applied, AppliedAnswer, AppliedWork, MatrixAnswer, MatrixWork, SparseAnswer, StencilWork,
 };
-use crate::http::fields::{Degenerate, Diagnostics, Fit, Geometry, MeanChoice, ValuesInclude, request};
+use crate::http::fields::{Diagnostics, Fit, Flag, MeanChoice, Surface, ValuesInclude, request};
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
@@ -22,7 +22,7 @@ const OPERATOR: Operator = Operator::SurfaceGradient;
 
 request! {
     /// Values on a surface, and queries at which to compute their surface gradient.
-    pub struct SurfaceGradientRequest with geometry taking hyperparameters {
+    pub struct SurfaceGradientRequest with surface taking hyperparameters {
         /// The values at the points of `cloud`, in their order.
         #[schema(min_items = 1)]
         pub values: Vec<f64>,
@@ -32,7 +32,7 @@ request! {
         #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The surface, if its fit differs from that of the values.
-        pub geometry: Option<Geometry>,
+        pub surface: Option<Surface>,
         /// Optional parts of the answer. Default: none.
         pub include: Option<Vec<ValuesInclude>>,
     }
@@ -40,13 +40,13 @@ request! {
 
 request! {
     /// A cloud of nodes on a surface, and queries for the rows of its surface gradient matrices.
-    pub struct SurfaceGradientMatrixRequest with geometry taking hyperparameters {
+    pub struct SurfaceGradientMatrixRequest with surface taking hyperparameters {
         /// The points to compute rows for, one row of each matrix. Default: the points of the surface's
         /// cloud.
         #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The surface, if its fit differs from that of the values.
-        pub geometry: Option<Geometry>,
+        pub surface: Option<Surface>,
         /// The mean of the functions through the values. Default: 0.
         ///
         /// With a constant mean, the matrix maps constants to exactly 0.
@@ -59,13 +59,13 @@ answer! {
     pub struct SurfaceGradientResponse {
         /// ∇u − (∇u·ν)ν at each query, unit of the values per length. Null where there is no normal.
         gradients: Array as Vec<Option<Vec<f64>>>,
-        /// Standard deviation of each component at each query. Present if `include` has `deviations`.
+        /// Standard deviation of each component at each query. Present if `include` has `std`.
         ///
         /// It comes from noise and gaps of the values and, as far as the surface has deviations, also from
         /// the surface. Null where there is no answer or no deviation.
-        gradient_deviations: Option<Array> as Option<Vec<Option<Vec<f64>>>>,
+        gradient_std: Option<Array> as Option<Vec<Option<Vec<f64>>>>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
-        degenerate: Vec<Degenerate>,
+        flags: Vec<Flag>,
         /// The numbers used, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
     }
@@ -79,7 +79,7 @@ answer! {
         /// A row is null where there is no normal.
         matrices: Array as Vec<Vec<Option<Vec<f64>>>>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
-        degenerate: Vec<Degenerate>,
+        flags: Vec<Flag>,
         /// The numbers used, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
     }
@@ -113,8 +113,7 @@ impl Operation for SurfaceGradientRequest {
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<AppliedWork>, Problem> {
         let values = std::mem::take(&mut self.values);
         let fit = Fit { mean: self.mean, ..self.take_fit() };
-        let applied =
-            Applied { geometry: self.geometry, values, queries: self.queries, include: self.include };
+        let applied = Applied { surface: self.surface, values, queries: self.queries, include: self.include };
         AppliedWork::plan(planner, OPERATOR, fit, applied)
     }
 
@@ -123,14 +122,9 @@ impl Operation for SurfaceGradientRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<SurfaceGradientResponse, Problem> {
-        let AppliedAnswer { values, deviations, degenerate, diagnostics } =
+        let AppliedAnswer { values, deviations, flags, diagnostics } =
             work.apply(OPERATOR, fits, observer)?;
-        Ok(SurfaceGradientResponse {
-            gradients: values,
-            gradient_deviations: deviations,
-            degenerate,
-            diagnostics,
-        })
+        Ok(SurfaceGradientResponse { gradients: values, gradient_std: deviations, flags, diagnostics })
     }
 }
 
@@ -140,7 +134,7 @@ impl Operation for SurfaceGradientMatrixRequest {
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<MatrixWork>, Problem> {
         let fit = Fit { mean: self.mean, ..self.take_fit() };
-        MatrixWork::plan(planner, OPERATOR, fit, self.geometry, self.queries)
+        MatrixWork::plan(planner, OPERATOR, fit, self.surface, self.queries)
     }
 
     fn compute(
@@ -148,19 +142,19 @@ impl Operation for SurfaceGradientMatrixRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<SurfaceGradientMatrixResponse, Problem> {
-        let MatrixAnswer { matrix, degenerate, diagnostics } = work.matrix(OPERATOR, fits, observer)?;
-        Ok(SurfaceGradientMatrixResponse { matrices: matrix, degenerate, diagnostics })
+        let MatrixAnswer { matrix, flags, diagnostics } = work.matrix(OPERATOR, fits, observer)?;
+        Ok(SurfaceGradientMatrixResponse { matrices: matrix, flags, diagnostics })
     }
 }
 
 request! {
     /// A cloud of nodes on a surface, and queries for the rows of its sparse surface gradient matrices.
-    pub struct SurfaceGradientSparseMatrixRequest with geometry taking hyperparameters {
+    pub struct SurfaceGradientSparseMatrixRequest with surface taking hyperparameters {
         /// The points to compute rows for, one row of each matrix. Default: the points of the surface.
         #[schema(value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// The surface, if it differs from that of the request.
-        pub geometry: Option<Geometry>,
+        pub surface: Option<Surface>,
     }
 }
 
@@ -176,7 +170,7 @@ answer! {
         /// The entries row by row, 1/length, as a list per component.
         data: Array as Vec<Vec<f64>>,
         /// The queries where geometry has no meaning (an empty row), or less accuracy than it seems.
-        degenerate: Vec<Degenerate>,
+        flags: Vec<Flag>,
         /// The numbers used for the surface, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
     }
@@ -197,7 +191,7 @@ impl Operation for SurfaceGradientSparseMatrixRequest {
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<StencilWork>, Problem> {
         let fit = self.take_fit();
-        StencilWork::plan(planner, OPERATOR, fit, self.geometry, self.queries)
+        StencilWork::plan(planner, OPERATOR, fit, self.surface, self.queries)
     }
 
     fn compute(
@@ -205,8 +199,8 @@ impl Operation for SurfaceGradientSparseMatrixRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<SurfaceGradientSparseMatrixResponse, Problem> {
-        let SparseAnswer { shape, indptr, indices, data, degenerate, diagnostics } =
+        let SparseAnswer { shape, indptr, indices, data, flags, diagnostics } =
             work.matrix(OPERATOR, fits, observer)?;
-        Ok(SurfaceGradientSparseMatrixResponse { shape, indptr, indices, data, degenerate, diagnostics })
+        Ok(SurfaceGradientSparseMatrixResponse { shape, indptr, indices, data, flags, diagnostics })
     }
 }

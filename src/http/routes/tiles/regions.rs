@@ -71,7 +71,7 @@ impl Operation for RegionsRequest {
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<RegionsWork>, Problem> {
         let fit = self.take_fit();
         let request = GeometryRequest {
-            model: SurfaceModel::Local,
+            model: SurfaceModel::Regression,
             checks_curvatures: false,
             ..GeometryRequest::CURVATURES
         };

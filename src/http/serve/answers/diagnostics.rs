@@ -42,7 +42,8 @@ impl FitModel {
             },
             rank: report.rank,
             remaining_diagonal: report.remaining.map(|remaining| remaining.largest * scale),
-            tolerance: report.tolerance.or(report.remaining.map(|remaining| remaining.tolerance * scale)),
+            diagonal_tolerance: report.remaining.map(|remaining| remaining.tolerance * scale),
+            tolerance: report.tolerance,
             iterations: report.n_iterations,
             reciprocal_condition: report.reciprocal_condition,
             relative_residual: report.relative_residual,
@@ -55,7 +56,7 @@ impl FitModel {
             reach: report.reach,
             stencils: None,
             warnings: self.warnings(report, n_queries),
-            geometry: None,
+            surface: None,
         }
     }
 

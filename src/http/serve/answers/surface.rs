@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::http::fields::{
-    Degenerate, DegenerateReason, Diagnostics, StencilsUsed, SurfaceUsed, Warning, WarningCode,
+    Diagnostics, Flag, FlagReason, StencilsUsed, SurfaceModelUsed, Warning, WarningCode,
 };
 use crate::http::problem::Problem;
 use crate::http::serve::fitted::Fits;
@@ -15,7 +15,7 @@ use gramian_numerics::model::Report;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::regression::function::interpolant::Interpolant;
 use gramian_numerics::surface::Surface;
-use gramian_numerics::surface::degeneracy::{Degeneracy, DegeneracyReason};
+use gramian_numerics::surface::flags::{self, FlagReason as Reason};
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, Orientation};
 use gramian_numerics::surface::served::ServedBy;
 
@@ -57,21 +57,21 @@ impl Fits {
 
 impl SurfaceGeometry {
     /// Returns the queries that have no answer or a flag.
-    pub fn degenerate(&self) -> Vec<Degenerate> {
-        let entry = |d: &Degeneracy| Degenerate {
+    pub fn flags(&self) -> Vec<Flag> {
+        let entry = |d: &flags::Flag| Flag {
             query: d.query,
             reason: match d.reason {
-                DegeneracyReason::VanishingGradient => DegenerateReason::VanishingGradient,
-                DegeneracyReason::UnaffordableRescue => DegenerateReason::UnaffordableRescue,
-                DegeneracyReason::KernelTooRough => DegenerateReason::KernelTooRough,
-                DegeneracyReason::FarFromCloud => DegenerateReason::FarFromCloud,
-                DegeneracyReason::UnderResolved => DegenerateReason::UnderResolved,
-                DegeneracyReason::AmbiguousSide => DegenerateReason::AmbiguousSide,
-                DegeneracyReason::Edge => DegenerateReason::Edge,
+                Reason::VanishingGradient => FlagReason::VanishingGradient,
+                Reason::UnaffordableRescue => FlagReason::UnaffordableRescue,
+                Reason::KernelTooRough => FlagReason::KernelTooRough,
+                Reason::FarFromCloud => FlagReason::FarFromCloud,
+                Reason::UnderResolved => FlagReason::UnderResolved,
+                Reason::AmbiguousSide => FlagReason::AmbiguousSide,
+                Reason::Edge => FlagReason::Edge,
             },
             gradient_norm: d.gradient_norm,
         };
-        self.geometry.degenerate().iter().map(entry).collect()
+        self.geometry.flags().iter().map(entry).collect()
     }
 
     /// Flags queries where results for the values are doubtful, unless they are flagged already.
@@ -83,7 +83,7 @@ impl SurfaceGeometry {
     pub fn flag_uncertain(
         &self,
         judged: Result<Vec<usize>, NumericsError>,
-        degenerate: &mut Vec<Degenerate>,
+        flags: &mut Vec<Flag>,
     ) -> Result<(), NumericsError> {
         let m = self.geometry.n_queries();
         let queries = match judged {
@@ -92,14 +92,14 @@ impl SurfaceGeometry {
             Ok(queries) => queries,
         };
         let mut is_flagged = self.geometry.is_null().to_vec();
-        degenerate.iter().for_each(|entry| is_flagged[entry.query] = true);
+        flags.iter().for_each(|entry| is_flagged[entry.query] = true);
         for query in queries {
             if !std::mem::replace(&mut is_flagged[query], true) {
                 let gradient_norm = self.geometry.gradient_norms()[query];
-                degenerate.push(Degenerate { query, reason: DegenerateReason::Uncertain, gradient_norm });
+                flags.push(Flag { query, reason: FlagReason::Uncertain, gradient_norm });
             }
         }
-        degenerate.sort_by_key(|entry| entry.query);
+        flags.sort_by_key(|entry| entry.query);
         Ok(())
     }
 
@@ -122,11 +122,11 @@ impl SurfaceGeometry {
     }
 
     /// Returns which function serves each query.
-    pub fn surfaces(&self) -> Vec<SurfaceUsed> {
+    pub fn surface_models(&self) -> Vec<SurfaceModelUsed> {
         let used = |query| match self.geometry.served_by(query) {
-            ServedBy::Signature => SurfaceUsed::Signature,
-            ServedBy::Offset => SurfaceUsed::Offset,
-            ServedBy::Local => SurfaceUsed::Local,
+            ServedBy::Signature => SurfaceModelUsed::Signature,
+            ServedBy::Offset => SurfaceModelUsed::Offset,
+            ServedBy::Regression => SurfaceModelUsed::Regression,
         };
         (0..self.geometry.n_queries()).map(used).collect()
     }
@@ -172,8 +172,7 @@ impl SurfaceGeometry {
     /// Warnings about repairs, and counts of the flags of single queries.
     fn warnings(&self) -> Vec<Warning> {
         let (m, n) = (self.geometry.n_queries(), self.surface.cloud().n_points());
-        let flagged =
-            |reason| self.geometry.degenerate().iter().filter(|entry| entry.reason == reason).count();
+        let flagged = |reason| self.geometry.flags().iter().filter(|entry| entry.reason == reason).count();
         let n_offset = (0..m).filter(|&query| self.geometry.served_by(query) == ServedBy::Offset).count();
         let orientation = self.surface.orientation();
         let is_laplace = self.surface.signature().is_some_and(is_laplace);
@@ -181,10 +180,10 @@ impl SurfaceGeometry {
         let disagrees = if self.request.checks_curvatures { DISAGREES } else { UNCERTAIN };
         let counted = [
             (n_offset, WarningCode::OffsetModelUsed, "served by the offset model"),
-            (flagged(DegeneracyReason::KernelTooRough), WarningCode::KernelTooRough, too_rough),
-            (flagged(DegeneracyReason::UnderResolved), WarningCode::DisagreesWithNeighbours, disagrees),
-            (flagged(DegeneracyReason::FarFromCloud), WarningCode::FarFromCloud, FAR),
-            (flagged(DegeneracyReason::Edge), WarningCode::SharpEdges, EDGES),
+            (flagged(Reason::KernelTooRough), WarningCode::KernelTooRough, too_rough),
+            (flagged(Reason::UnderResolved), WarningCode::DisagreesWithNeighbours, disagrees),
+            (flagged(Reason::FarFromCloud), WarningCode::FarFromCloud, FAR),
+            (flagged(Reason::Edge), WarningCode::SharpEdges, EDGES),
         ];
         let counted = counted.into_iter().filter(|(count, ..)| *count > 0);
         let mut warnings: Vec<Warning> = counted
@@ -210,8 +209,8 @@ fn is_laplace(signature: &Interpolant) -> bool {
 
 const LAPLACE_TOO_ROUGH: &str = "curvatures see the cusp of the kernel at the points; raise epsilon until sqrt(epsilon)·length_scale is twice the spacing";
 const KERNEL_TOO_ROUGH: &str = "curvatures see the cusp of the kernel at the points; take a smoother kernel";
-const DISAGREES: &str = "curvatures are not confirmed by the points around them; see degenerate";
-const UNCERTAIN: &str = "normals are uncertain by 17 degrees or more; see degenerate";
+const DISAGREES: &str = "curvatures are not confirmed by the points around them; see flags";
+const UNCERTAIN: &str = "normals are uncertain by 17 degrees or more; see flags";
 const FAR: &str = "farther from the cloud than three spacings";
 const EDGES: &str = "at a sharp edge, where two sheets meet; include edge_normals for the normals of both";
 const OPEN_CLOUD: &str =

@@ -1,7 +1,7 @@
 //! Choice of kernel, regularization and solver in a request, and refusals of combinations that do not work.
 
 use super::inputs::length_mismatch;
-use crate::http::fields::{CloudRef, Fit, Geometry, Hyperparameters, Kernel, SolverChoice};
+use crate::http::fields::{CloudRef, Fit, Hyperparameters, Kernel, SolverChoice, Surface};
 use crate::http::problem::{Pointers, Problem};
 use crate::http::problem::{catalogue, from_numerics};
 use crate::http::serve::plan::FittedCloud;
@@ -45,7 +45,7 @@ pub(super) const TRY_LOCAL: &str =
 /// Returns 422 for dense matrices of operators with the local solver. They need one function for all queries.
 pub(super) fn local_lacks_operators(pointer: &str) -> Problem {
     let detail = "a dense matrix needs one function of all values, which the local solver does not have: set \"solver\": \
-                  \"dense\", with \"geometry\": {\"surface\": \"local\"} for a local surface, or ask for the sparse matrix at \
+                  \"dense\", with \"surface\": {\"model\": \"regression\"} for a local surface, or ask for the sparse matrix at \
                   /v1/laplace-beltrami/sparse-matrix or /v1/surface-gradient/sparse-matrix";
     Problem::of_field(catalogue::UNSUPPORTED_BY_SOLVER, pointer, detail)
 }
@@ -97,19 +97,19 @@ pub(super) fn pointers_of(cloud: &CloudRef, has_noise_variances: bool) -> Pointe
     }
 }
 
-/// Returns the pointers to the fit of the surface. Fields that `geometry` leaves out are those of the
+/// Returns the pointers to the fit of the surface. Fields that `surface` leaves out are those of the
 /// request.
-pub(super) fn pointers_of_surface(geometry: &Geometry, request: Pointers) -> Pointers {
+pub(super) fn pointers_of_surface(surface: &Surface, request: Pointers) -> Pointers {
     Pointers {
-        points: match &geometry.cloud {
+        points: match &surface.cloud {
             None => request.points,
-            Some(cloud) if cloud.id.is_some() => "/geometry/cloud/id",
-            Some(_) => "/geometry/cloud/points",
+            Some(cloud) if cloud.id.is_some() => "/surface/cloud/id",
+            Some(_) => "/surface/cloud/points",
         },
-        kernel: if geometry.kernel.is_some() { "/geometry/kernel" } else { request.kernel },
-        regularization: match (&geometry.noise_variances, geometry.alpha) {
-            (Some(_), _) => "/geometry/noise_variances",
-            (None, Some(_)) => "/geometry/alpha",
+        kernel: if surface.kernel.is_some() { "/surface/kernel" } else { request.kernel },
+        regularization: match (&surface.noise_variances, surface.alpha) {
+            (Some(_), _) => "/surface/noise_variances",
+            (None, Some(_)) => "/surface/alpha",
             (None, None) => request.regularization,
         },
         ..request

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use super::plan::{FittedCloud, PlannedSurface, PlannedValues, SurfaceSource, Values};
 use crate::http::fields::kernel::PlannedKernel;
 use crate::http::fields::limits::too_many_dense_points;
-use crate::http::fields::{Fit, Geometry, SolverChoice};
+use crate::http::fields::{Fit, SolverChoice, Surface};
 use crate::http::problem::catalogue;
 use crate::http::problem::{Problem, dimension_mismatch};
 use crate::http::state::app::App;
@@ -169,7 +169,7 @@ impl<'a> Planner<'a> {
     ) -> Result<Regressed, Problem> {
         let (n_points, dimension) = (on.stored.cloud.n_points(), on.stored.cloud.dimension());
         let given = options.given_process(on.pointers);
-        if options.solver == SolverChoice::Local || request.model == SurfaceModel::Local {
+        if options.solver == SolverChoice::Local || request.model == SurfaceModel::Regression {
             let pointer = if options.solver == SolverChoice::Local { "/solver" } else { "/surface" };
             if dimension > MAX_LOCAL_DIMENSION {
                 let detail = format!(
@@ -211,13 +211,13 @@ impl<'a> Planner<'a> {
     pub fn stencils(
         &self,
         mut fit: Fit,
-        geometry: Option<Geometry>,
+        surface: Option<Surface>,
         request: &GeometryRequest,
     ) -> Result<(Arc<RegisteredCloud>, PlannedSurface), Problem> {
         let on = self.fitted_cloud(&mut fit)?;
         let nodes = on.stored.clone();
         // Nodes need no solver, so the options of the request are those of the surface.
-        let SurfaceUnder { on, options, .. } = self.surface_under(&on, FitOptions::of(fit), geometry)?;
+        let SurfaceUnder { on, options, .. } = self.surface_under(&on, FitOptions::of(fit), surface)?;
         Ok((nodes, self.plan_surface(on, options, Purpose::Curvatures, request)?))
     }
 
@@ -231,12 +231,12 @@ impl<'a> Planner<'a> {
         &self,
         mut fit: Fit,
         given: GivenValues,
-        geometry: Option<Geometry>,
+        surface: Option<Surface>,
         request: &GeometryRequest,
     ) -> Result<OperatorFits, Problem> {
         let on = self.fitted_cloud(&mut fit)?;
         let (solver, options) = (self.solver_of_values(&fit, &on), FitOptions::of(fit));
-        let under = self.surface_under(&on, options.clone(), geometry)?;
+        let under = self.surface_under(&on, options.clone(), surface)?;
         let (main, values) = self.plan_given_values(on, options, solver, given)?;
         Ok(OperatorFits { main, values, surface: self.plan_surface_under(under, request)? })
     }
@@ -265,14 +265,14 @@ impl<'a> Planner<'a> {
     /// Checks the fits for a matrix on values that are not given: of these values, and of the surface under
     /// them.
     ///
-    /// Fields that `geometry` leaves out are those of the request.
+    /// Fields that `surface` leaves out are those of the request.
     ///
     /// # Errors
     /// Returns a [`Problem`] with a pointer to the field.
     pub fn matrix_fits(
         &self,
         mut fit: Fit,
-        geometry: Option<Geometry>,
+        surface: Option<Surface>,
         request: &GeometryRequest,
     ) -> Result<(PlannedValues, PlannedSurface), Problem> {
         if fit.solver == SolverChoice::Local {
@@ -288,45 +288,45 @@ impl<'a> Planner<'a> {
         }
         let on = self.fitted_cloud(&mut fit)?;
         let (solver, options) = (ValuesSolver::asked(of_whole(fit.solver)), FitOptions::of(fit));
-        let under = self.surface_under(&on, options.clone(), geometry)?;
+        let under = self.surface_under(&on, options.clone(), surface)?;
         let main = self.plan_values(on, options, solver, Mean::Zero)?;
         Ok((main, self.plan_surface_under(under, request)?))
     }
 
-    /// Checks the surface under values or nodes. Fields that `geometry` leaves out are those of the request.
+    /// Checks the surface under values or nodes. Fields that `surface` leaves out are those of the request.
     fn surface_under(
         &self,
         values: &FittedCloud,
         options: FitOptions,
-        geometry: Option<Geometry>,
+        surface: Option<Surface>,
     ) -> Result<SurfaceUnder, Problem> {
-        let geometry = geometry.unwrap_or_default();
-        let pointers = pointers_of_surface(&geometry, values.pointers);
-        let stored = match geometry.cloud {
+        let surface = surface.unwrap_or_default();
+        let pointers = pointers_of_surface(&surface, values.pointers);
+        let stored = match surface.cloud {
             None => values.stored.clone(),
-            Some(cloud) => self.cloud(cloud, "/geometry/cloud")?,
+            Some(cloud) => self.cloud(cloud, "/surface/cloud")?,
         };
         let (expected, found) = (values.stored.cloud.dimension(), stored.cloud.dimension());
         if expected != found {
-            return Err(dimension_mismatch("/geometry/cloud", expected, found));
+            return Err(dimension_mismatch("/surface/cloud", expected, found));
         }
-        let inherits_noise = geometry.alpha.is_none() && geometry.noise_variances.is_none();
+        let inherits_noise = surface.alpha.is_none() && surface.noise_variances.is_none();
         if inherits_noise && options.noise_variances.is_some() && stored.id != values.stored.id {
             let detail =
                 "noise_variances belong to the points of cloud; give alpha or noise_variances here as well";
-            return Err(Problem::invalid_request("/geometry", detail));
+            return Err(Problem::invalid_request("/surface", detail));
         }
-        let has_own_process = geometry.kernel.is_some() || !inherits_noise;
+        let has_own_process = surface.kernel.is_some() || !inherits_noise;
         let (alpha, noise_variances) = if inherits_noise {
             (options.alpha, options.noise_variances)
         } else {
-            (geometry.alpha, geometry.noise_variances)
+            (surface.alpha, surface.noise_variances)
         };
         let options = FitOptions {
-            kernel: geometry.kernel.or(options.kernel),
+            kernel: surface.kernel.or(options.kernel),
             alpha,
             noise_variances,
-            solver: geometry.solver.unwrap_or(options.solver),
+            solver: surface.solver.unwrap_or(options.solver),
             mean: None,
             sites: options.sites,
             hyperparameters: options.hyperparameters,
@@ -344,7 +344,7 @@ impl<'a> Planner<'a> {
         let solver = options.solver;
         let is_beyond = on.n_points() > self.app.config.max_dense_points;
         let is_local = solver == SolverChoice::Local
-            || request.model == SurfaceModel::Local
+            || request.model == SurfaceModel::Regression
             || solver == SolverChoice::Auto && is_beyond;
         let options = if is_local && !has_own_process {
             FitOptions { solver, hyperparameters: options.hyperparameters, ..FitOptions::default() }
@@ -463,6 +463,6 @@ impl ValuesSolver {
 struct SurfaceUnder {
     on: FittedCloud,
     options: FitOptions,
-    /// Whether `geometry` gives kernel or noise, so that they are not those of the values.
+    /// Whether `surface` gives kernel or noise, so that they are not those of the values.
     has_own_process: bool,
 }

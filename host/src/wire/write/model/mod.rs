@@ -46,8 +46,7 @@ impl Shape {
 }
 
 /// Quantities that programs colour by when they know no names, the preferred one first.
-const QUALITIES: [&str; 5] =
-    ["mean_curvature", "position_deviation", "normal_deviation", "residual", "level"];
+const QUALITIES: [&str; 5] = ["mean_curvature", "position_std", "normal_std", "residual", "level"];
 
 /// A number at each vertex.
 pub(super) struct Property<'a> {

@@ -4,7 +4,7 @@ n is the number of points of the cloud, d their dimension, m the number of queri
 of values. L is the unit of the coordinates and V the unit of the values.
 
 Arrays keep the order of the request. They are read-only views of the answer's bytes: `.copy()` them to change
-them. They have NaN where there is no meaningful number, and `degenerate` then says why. Answers can be
+them. They have NaN where there is no meaningful number, and `flags` then says why. Answers can be
 pickled and used by several threads. `repr` shows arrays by their shapes.
 """
 

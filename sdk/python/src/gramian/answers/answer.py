@@ -9,18 +9,18 @@ from typing import Any, Self
 import numpy as np
 
 from ..arguments.describe import described
-from ..rest.models import Degenerate, Diagnostics, FamilyScore, KernelUsed, MeshPart, SurfaceUsed
+from ..rest.models import Flag, Diagnostics, FamilyScore, KernelUsed, MeshPart, SurfaceModelUsed
 from ..wire.tensors import Array, Members
 from .html import page_of
 
 OBJECTS: Mapping[str, Callable[[Any], object]] = {
     "diagnostics": Diagnostics.from_dict,
     "kernel": KernelUsed.from_dict,
-    "degenerate": lambda entries: tuple(map(Degenerate.from_dict, entries)),
+    "flags": lambda entries: tuple(map(Flag.from_dict, entries)),
     "parts": lambda parts: tuple(map(MeshPart.from_dict, parts)),
     "dropped_parts": lambda parts: tuple(map(MeshPart.from_dict, parts)),
     "families": lambda entries: tuple(map(FamilyScore.from_dict, entries)),
-    "surfaces": lambda names: tuple(map(SurfaceUsed, names)),
+    "surface_models": lambda names: tuple(map(SurfaceModelUsed, names)),
 }
 """Readers of the members that are neither arrays nor single numbers, by name."""
 

@@ -24,11 +24,11 @@ class InterpolationBatch(ValuesAnswer):
         `[k, m, d]`, V/L. ∇u of each list, with `derivatives` of 1 or 2.
     hessians
         `[k, m, d, d]`, V/L². D²u of each list, with `derivatives` of 2.
-    value_deviations
-        `[m]`, V. Standard deviation of any of the functions given its values, with `deviations`.
-    gradient_deviations
+    value_std
+        `[m]`, V. Standard deviation of any of the functions given its values, with `std`.
+    gradient_std
         `[m, d]`, V/L. Standard deviations of the components of any ∇u.
-    hessian_deviations
+    hessian_std
         `[m, d, d]`, V/L². Standard deviations of the entries of any D²u.
     mean_coefficients
         `[k, p]`. Mean of each list: the constant, V, then, if the mean is linear, a slope for each
@@ -43,9 +43,9 @@ class InterpolationBatch(ValuesAnswer):
     values: Array
     gradients: Array | None = None
     hessians: Array | None = None
-    value_deviations: Array | None = None
-    gradient_deviations: Array | None = None
-    hessian_deviations: Array | None = None
+    value_std: Array | None = None
+    gradient_std: Array | None = None
+    hessian_std: Array | None = None
     mean_coefficients: Array | None = None
     diagnostics: Diagnostics
     fit: ValuesFit

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..arguments.fit import Geometry, ValuesFit
+from ..arguments.fit import Surface, ValuesFit
 from ..arguments.options import OperatorFit, SurfaceFit
 from ..rest.models import (
     Diagnostics,
@@ -18,7 +18,7 @@ from ..rest.models import (
     MeanChoice,
     SolverChoice,
     SolverUsed,
-    SurfaceChoice,
+    SurfaceModelChoice,
 )
 from ..rest.types import Unset
 from ..wire.tensors import Array, Members
@@ -61,7 +61,7 @@ def selected_fit(members: Members) -> ValuesFit:
 
 def operator_fit_used(members: Members) -> OperatorFit:
     """Returns the fit of values that the service used, ready to be sent again, with the fit of the surface."""
-    fit, surface = values_fit_used(members), members.diagnostics.geometry
+    fit, surface = values_fit_used(members), members.diagnostics.surface
     # Stencils fit nothing to the values, so the diagnostics are those of the surface.
     if isinstance(surface, Unset):
         surface = members.diagnostics
@@ -70,25 +70,25 @@ def operator_fit_used(members: Members) -> OperatorFit:
         # The service chose kernel and noise from the values. Leaving them out repeats that choice.
         fit.pop("kernel", None)
         fit.pop("alpha", None)
-    return OperatorFit(**fit, geometry=_geometry_used(members.request, surface))
+    return OperatorFit(**fit, surface=_surface_used(members.request, surface))
 
 
-def _geometry_used(request: Mapping[str, Any], surface: Diagnostics) -> Geometry:
+def _surface_used(request: Mapping[str, Any], surface: Diagnostics) -> Surface:
     """Returns the options of the surface as used. They replace those that the request left out."""
-    asked = request.get("geometry", {})
-    geometry = Geometry(
+    asked = request.get("surface", {})
+    used = Surface(
         cloud=None if surface.cloud_id == request["cloud"]["id"] else surface.cloud_id,
         solver=surface.solver,
-        surface=SurfaceChoice(asked["surface"]) if "surface" in asked else None,
+        model=SurfaceModelChoice(asked["model"]) if "model" in asked else None,
     )
     if surface.solver is SolverUsed.LOCAL:
-        return geometry
+        return used
     # No α in the diagnostics: each point had its own noise.
     if isinstance(surface.alpha, Unset):
-        # A geometry without noise variances takes those of the values.
+        # A surface without noise variances takes those of the values.
         noise_variances = asked.get("noise_variances", request.get("noise_variances"))
-        return replace(geometry, kernel=surface.kernel, noise_variances=_own_copy(noise_variances))
-    return replace(geometry, kernel=surface.kernel, alpha=surface.alpha)
+        return replace(used, kernel=surface.kernel, noise_variances=_own_copy(noise_variances))
+    return replace(used, kernel=surface.kernel, alpha=surface.alpha)
 
 
 def _reported_fit(members: Members) -> OperatorFit:

@@ -47,13 +47,13 @@ class Mesh(Answer):
         `[k, d − 1]`, 1/L, ascending.
     mean_curvatures
         `[k]`, 1/L. The average of the principal curvatures.
-    position_deviations
+    position_std
         `[k]`, L. Standard deviation of each vertex along its normal.
-    normal_deviations
+    normal_std
         `[k]`, radians. Standard deviation of the angle of the normal.
-    principal_curvature_deviations
+    principal_curvature_std
         `[k, d − 1]`, 1/L. Standard deviations of the principal curvatures.
-    mean_curvature_deviations
+    mean_curvature_std
         `[k]`, 1/L. Standard deviations of the mean curvatures.
     parts
         The connected parts of the mesh, largest first, with their Euler characteristics and areas.
@@ -74,10 +74,10 @@ class Mesh(Answer):
     residuals: Array
     principal_curvatures: Array | None = None
     mean_curvatures: Array | None = None
-    position_deviations: Array | None = None
-    normal_deviations: Array | None = None
-    principal_curvature_deviations: Array | None = None
-    mean_curvature_deviations: Array | None = None
+    position_std: Array | None = None
+    normal_std: Array | None = None
+    principal_curvature_std: Array | None = None
+    mean_curvature_std: Array | None = None
     parts: tuple[MeshPart, ...]
     dropped_parts: tuple[MeshPart, ...]
     closedness: float | None = None

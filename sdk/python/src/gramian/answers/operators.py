@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
 from ..arguments.options import OperatorFit, SurfaceOperatorFit
-from ..rest.models import Degenerate, Diagnostics
+from ..rest.models import Flag, Diagnostics
 from ..wire.tensors import Array, Members
 from .answer import Answer
 from .fit import operator_fit_used
@@ -33,21 +33,21 @@ class SurfaceGradient(OperatorAnswer):
     ----------
     gradients
         `[m, d]`, V/L, tangent to the surface.
-    gradient_deviations
-        `[m, d]`, V/L, with `deviations`. Standard deviations given the values and, as far as it is known, the
+    gradient_std
+        `[m, d]`, V/L, with `std`. Standard deviations given the values and, as far as it is known, the
         surface.
-    degenerate
+    flags
         The queries without a normal, or with a doubtful one.
     diagnostics
-        Diagnostics of the fit of the values. `diagnostics.geometry` describes the fit of the surface.
+        Diagnostics of the fit of the values. `diagnostics.surface` describes the fit of the surface.
     fit
         All options of the fit, as used, including those of the surface. `**answer.fit` in a call repeats the
         fit.
     """
 
     gradients: Array
-    gradient_deviations: Array | None = None
-    degenerate: tuple[Degenerate, ...]
+    gradient_std: Array | None = None
+    flags: tuple[Flag, ...]
     diagnostics: Diagnostics
     fit: OperatorFit
 
@@ -60,17 +60,17 @@ class SurfaceGradientMatrix(OperatorAnswer):
     ----------
     matrices
         `[d, m, n]`, 1/L. `matrices @ values` has the shape `[d, m]`.
-    degenerate
+    flags
         The queries without a normal, or with a doubtful one.
     diagnostics
-        Diagnostics of the fit of values. `diagnostics.geometry` describes the fit of the surface.
+        Diagnostics of the fit of values. `diagnostics.surface` describes the fit of the surface.
     fit
         All options of the fit, as used, including those of the surface. `**answer.fit` in a call repeats the
         fit.
     """
 
     matrices: Array
-    degenerate: tuple[Degenerate, ...]
+    flags: tuple[Flag, ...]
     diagnostics: Diagnostics
     fit: OperatorFit
 
@@ -85,7 +85,7 @@ class SurfaceGradientSparseMatrix(OperatorAnswer):
         d matrices of type `scipy.sparse.csr_matrix`, each `[m, n]`, 1/L. All have entries at the same places.
         `matrices[i] @ values` is component i at the queries. Rows of queries without a normal have no
         entries.
-    degenerate
+    flags
         The queries without a normal, or with a doubtful one.
     diagnostics
         Diagnostics of the fit of the surface. Nothing is fitted to values.
@@ -94,7 +94,7 @@ class SurfaceGradientSparseMatrix(OperatorAnswer):
     """
 
     matrices: list[csr_matrix]
-    degenerate: tuple[Degenerate, ...]
+    flags: tuple[Flag, ...]
     diagnostics: Diagnostics
     fit: SurfaceOperatorFit
 
@@ -110,23 +110,23 @@ class LaplaceBeltrami(OperatorAnswer):
 
     Attributes
     ----------
-    values
+    laplacians
         `[m]`, V/L². Δu.
-    value_deviations
-        `[m]`, V/L², with `deviations`. Standard deviations given the values and, as far as it is known, the
+    laplacian_std
+        `[m]`, V/L², with `std`. Standard deviations given the values and, as far as it is known, the
         surface.
-    degenerate
+    flags
         The queries without a normal, or with a doubtful one.
     diagnostics
-        Diagnostics of the fit of the values. `diagnostics.geometry` describes the fit of the surface.
+        Diagnostics of the fit of the values. `diagnostics.surface` describes the fit of the surface.
     fit
         All options of the fit, as used, including those of the surface. `**answer.fit` in a call repeats the
         fit.
     """
 
-    values: Array
-    value_deviations: Array | None = None
-    degenerate: tuple[Degenerate, ...]
+    laplacians: Array
+    laplacian_std: Array | None = None
+    flags: tuple[Flag, ...]
     diagnostics: Diagnostics
     fit: OperatorFit
 
@@ -139,17 +139,17 @@ class LaplaceBeltramiMatrix(OperatorAnswer):
     ----------
     matrix
         `[m, n]`, 1/L². `matrix @ values` is Δu at the queries. Not symmetric in general.
-    degenerate
+    flags
         The queries without a normal, or with a doubtful one.
     diagnostics
-        Diagnostics of the fit of values. `diagnostics.geometry` describes the fit of the surface.
+        Diagnostics of the fit of values. `diagnostics.surface` describes the fit of the surface.
     fit
         All options of the fit, as used, including those of the surface. `**answer.fit` in a call repeats the
         fit.
     """
 
     matrix: Array
-    degenerate: tuple[Degenerate, ...]
+    flags: tuple[Flag, ...]
     diagnostics: Diagnostics
     fit: OperatorFit
 
@@ -163,7 +163,7 @@ class LaplaceBeltramiSparseMatrix(OperatorAnswer):
     matrix
         `scipy.sparse.csr_matrix`, `[m, n]`, 1/L². `matrix @ values` is Δu at the queries. Not symmetric. Rows
         of queries without a normal have no entries.
-    degenerate
+    flags
         The queries without a normal, or with a doubtful one.
     diagnostics
         Diagnostics of the fit of the surface. Nothing is fitted to values.
@@ -172,7 +172,7 @@ class LaplaceBeltramiSparseMatrix(OperatorAnswer):
     """
 
     matrix: csr_matrix
-    degenerate: tuple[Degenerate, ...]
+    flags: tuple[Flag, ...]
     diagnostics: Diagnostics
     fit: SurfaceOperatorFit
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, Self
 
 from ..arguments.options import SurfaceFit
-from ..rest.models import Degenerate, Diagnostics, SurfaceUsed
+from ..rest.models import Flag, Diagnostics, SurfaceModelUsed
 from ..wire.tensors import Array, Members
 from .answer import Answer, numbers_of
 from .fit import surface_fit_used
@@ -73,17 +73,17 @@ class Normals(SurfaceAnswer):
     normals
         `[m, d]`, of length 1, outward unless requested otherwise.
     gradient_norms
-        `[m]`. |∇u| of the function in `surfaces`: 1/L for `signature`, about 1 for `offset`, 1 for `local`.
+        `[m]`. |∇u| of the function in `surface_models`: 1/L for `signature`, about 1 for `offset`, 1 for `regression`.
     levels
         `[m]`. The signature function: 1 on the surface, usually greater inside a closed one.
-    surfaces
+    surface_models
         m entries. The function whose level set was used.
-    normal_deviations
+    normal_std
         `[m]`, radians. Standard deviation σ of the angle of the normal: 95 % of the angles are below 1.96 σ.
         NaN where it is unknown.
     edge_normals
         `[m, 2, d]`. Normals of the two sheets at queries on a sharp edge, NaN elsewhere. None unless requested.
-    degenerate
+    flags
         The queries without a normal, or with a doubtful one.
     diagnostics
         The kernel and α used, how the system was solved, and how well.
@@ -94,10 +94,10 @@ class Normals(SurfaceAnswer):
     normals: Array
     gradient_norms: Array
     levels: Array
-    surfaces: tuple[SurfaceUsed, ...]
-    normal_deviations: Array | None = None
+    surface_models: tuple[SurfaceModelUsed, ...]
+    normal_std: Array | None = None
     edge_normals: Array | None = None
-    degenerate: tuple[Degenerate, ...]
+    flags: tuple[Flag, ...]
     diagnostics: Diagnostics
     fit: SurfaceFit
 
@@ -122,23 +122,23 @@ class Curvatures(SurfaceAnswer):
     normals
         `[m, d]`, of length 1.
     gradient_norms
-        `[m]`. |∇u| of the function in `surfaces`: 1/L for `signature`, about 1 for `offset`, 1 for `local`.
+        `[m]`. |∇u| of the function in `surface_models`: 1/L for `signature`, about 1 for `offset`, 1 for `regression`.
     levels
         `[m]`. The signature function: 1 on the surface, usually greater inside a closed one.
-    surfaces
+    surface_models
         m entries. The function whose level set was used.
-    normal_deviations
+    normal_std
         `[m]`, radians. Standard deviation σ of the angle of the normal: 95 % of the angles are below 1.96 σ.
         NaN where it is unknown.
-    principal_curvature_deviations
+    principal_curvature_std
         `[m, d − 1]`, 1/L. Standard deviations of the principal curvatures.
-    mean_curvature_deviations
+    mean_curvature_std
         `[m]`, 1/L. Standard deviations of the mean curvatures.
-    gaussian_curvature_deviations
+    gaussian_curvature_std
         `[m]`, 1/L^(d − 1). Standard deviations of the Gaussian curvatures.
     edge_normals
         `[m, 2, d]`. Normals of the two sheets at queries on a sharp edge, NaN elsewhere. None unless requested.
-    degenerate
+    flags
         The queries without curvatures, or with doubtful ones.
     diagnostics
         The kernel and α used, how the system was solved, and how well.
@@ -153,12 +153,12 @@ class Curvatures(SurfaceAnswer):
     normals: Array
     gradient_norms: Array
     levels: Array
-    surfaces: tuple[SurfaceUsed, ...]
-    normal_deviations: Array | None = None
-    principal_curvature_deviations: Array | None = None
-    mean_curvature_deviations: Array | None = None
-    gaussian_curvature_deviations: Array | None = None
+    surface_models: tuple[SurfaceModelUsed, ...]
+    normal_std: Array | None = None
+    principal_curvature_std: Array | None = None
+    mean_curvature_std: Array | None = None
+    gaussian_curvature_std: Array | None = None
     edge_normals: Array | None = None
-    degenerate: tuple[Degenerate, ...]
+    flags: tuple[Flag, ...]
     diagnostics: Diagnostics
     fit: SurfaceFit

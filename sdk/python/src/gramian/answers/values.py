@@ -33,9 +33,9 @@ class Interpolation(ValuesAnswer):
         `[m, d]`, V/L. ∇u, with `derivatives` of 1 or 2.
     hessians
         `[m, d, d]`, V/L². D²u, with `derivatives` of 2.
-    value_deviations, gradient_deviations, hessian_deviations
+    value_std, gradient_std, hessian_std
         Standard deviations of `values`, `gradients` and `hessians` given the data, of the same shapes, with
-        `deviations`.
+        `std`.
     diagnostics
         The kernel and α used, how the system was solved, and how well.
     fit
@@ -45,9 +45,9 @@ class Interpolation(ValuesAnswer):
     values: Array
     gradients: Array | None = None
     hessians: Array | None = None
-    value_deviations: Array | None = None
-    gradient_deviations: Array | None = None
-    hessian_deviations: Array | None = None
+    value_std: Array | None = None
+    gradient_std: Array | None = None
+    hessian_std: Array | None = None
     diagnostics: Diagnostics
     fit: ValuesFit
 

@@ -20,10 +20,12 @@ from ..rest.models import (
     MeshInclude,
     MeshQuality,
     OrientationChoice,
+    PosteriorOf,
     PosteriorQuantity,
     SolverChoice,
     SolverUsed,
-    SurfaceChoice,
+    SurfaceModelChoice,
+    SurfaceModelUsed,
     ValuesInclude,
 )
 from ..rest.types import Unset
@@ -47,24 +49,27 @@ Whole: TypeAlias = int | np.integer[Any] | npt.NDArray[np.integer[Any]]
 Family: TypeAlias = KernelFamily | Literal["gauss", "laplace", "matern", "wendland", "inverse_multiquadric"]
 Solver: TypeAlias = SolverChoice | SolverUsed | Literal["auto", "dense", "landmark", "iterative", "local"]
 Duplicates: TypeAlias = DuplicatePolicy | Literal["refuse", "merge"]
-Surface: TypeAlias = SurfaceChoice | Literal["auto", "signature", "offset", "local"]
-Deviations: TypeAlias = ValuesInclude | Literal["deviations"]
-GeometryWord: TypeAlias = GeometryInclude | Literal["deviations", "edge_normals"]
-MeshWord: TypeAlias = MeshInclude | Literal["curvatures", "deviations"]
+SurfaceModel: TypeAlias = (
+    SurfaceModelChoice | SurfaceModelUsed | Literal["auto", "signature", "offset", "regression"]
+)
+Std: TypeAlias = ValuesInclude | Literal["std"]
+GeometryWord: TypeAlias = GeometryInclude | Literal["std", "edge_normals"]
+MeshWord: TypeAlias = MeshInclude | Literal["curvatures", "std"]
 Quality: TypeAlias = MeshQuality | Literal["regular", "raw"]
 Mean: TypeAlias = MeanChoice | Literal["zero", "constant", "linear"]
 Orientation: TypeAlias = OrientationChoice | Literal["outward", "gradient"]
 Quantity: TypeAlias = (
     PosteriorQuantity
     | Literal[
-        "variance",
-        "observation_variance",
+        "variances",
+        "observation_variances",
         "covariance",
         "gradients",
         "gradient_variances",
         "log_marginal_likelihood",
     ]
 )
+Of: TypeAlias = PosteriorOf | Literal["function", "observation"]
 
 
 class KernelParameters(TypedDict, total=False):
@@ -195,7 +200,7 @@ class ValuesFit(Fit, total=False):
 
 @suggest_names
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Geometry:
+class Surface:
     """The surface of an operator, where it differs from the fit of the values.
 
     Absent options are those of the fit of the values.
@@ -213,7 +218,7 @@ class Geometry:
         `[k]`, the noise variance at each point, instead of `alpha`.
     solver
         The solver of its linear system.
-    surface
+    model
         The function whose level set is the surface.
     """
 
@@ -222,22 +227,22 @@ class Geometry:
     alpha: Number | None = None
     noise_variances: npt.ArrayLike | None = None
     solver: Solver | None = None
-    surface: Surface | None = None
+    model: SurfaceModel | None = None
 
     def __repr__(self) -> str:
-        return described("Geometry", vars(self))
+        return described("Surface", vars(self))
 
 
-class GeometryFields(TypedDict, total=False):
-    """A geometry as a dictionary: `{"kernel": "gauss", "alpha": 1e-8}`. `Geometry` documents the keys."""
+class SurfaceFields(TypedDict, total=False):
+    """A surface as a dictionary: `{"kernel": "gauss", "alpha": 1e-8}`. `Surface` documents the keys."""
 
     cloud: RegisteredCloud | str | None
     kernel: KernelLike | None
     alpha: Number | None
     noise_variances: npt.ArrayLike | None
     solver: Solver | None
-    surface: Surface | None
+    model: SurfaceModel | None
 
 
-GeometryLike: TypeAlias = "Geometry | GeometryFields | Diagnostics | RegisteredCloud"
-"""A surface: a `Geometry`, a dictionary, another cloud, or what `diagnostics.geometry` reports."""
+SurfaceLike: TypeAlias = "Surface | SurfaceFields | Diagnostics | RegisteredCloud"
+"""A surface: a `Surface`, a dictionary, another cloud, or what `diagnostics.surface` reports."""

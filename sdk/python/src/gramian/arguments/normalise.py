@@ -9,7 +9,7 @@
 | words | a word, or several |
 | a truth | `bool`, of Python or NumPy |
 | a kernel | a family, a mapping, `Kernel`, or what `diagnostics.kernel` or `Client.kernels()` reports |
-| a geometry | `Geometry`, a mapping, another `Cloud`, or what `diagnostics.geometry` reports |
+| a surface | `Surface`, a mapping, another `Cloud`, or what `diagnostics.surface` reports |
 | hyperparameters | a mapping, or what `diagnostics.hyperparameters` reports |
 | free parameters | a mapping to bounds, or a list of mappings with `parameter`, `min` and `max` |
 
@@ -36,14 +36,15 @@ from ..rest.models import (
     MeshInclude,
     MeshQuality,
     OrientationChoice,
+    PosteriorOf,
     PosteriorQuantity,
     SelectionCriterion,
     SelectionParameter,
     SolverChoice,
     SolverUsed,
-    SurfaceChoice,
+    SurfaceModelChoice,
 )
-from ..rest.models import Geometry as GeneratedGeometry
+from ..rest.models import Surface as GeneratedSurface
 from ..rest.types import Unset
 from .arrays import Sizes, as_array
 from .scalars import as_number, as_truth, as_whole, as_word, as_words, nearest, unwrapped
@@ -62,7 +63,7 @@ def normalise(
     fields
         The given values, by name.
     rules
-        A rule for each existing field: `REQUEST`, `GEOMETRIC`, `MESH`, `BATCH`, `KERNEL`, `GEOMETRY`, `CLIENT`.
+        A rule for each existing field: `REQUEST`, `GEOMETRIC`, `MESH`, `BATCH`, `KERNEL`, `SURFACE`, `CLIENT`.
     sizes
         The known lengths of the axes of arrays, by name: n points, d coordinates.
     path
@@ -126,11 +127,11 @@ def words(*words: str) -> Rule:
     return lambda name, value, _: as_words(name, value, known)
 
 
-def with_deviations(fields: Mapping[str, object]) -> dict[str, object]:
-    """Returns the fields with `"deviations"` in `include` instead of the argument `deviations`."""
-    others = {name: value for name, value in fields.items() if name != "deviations"}
-    deviations, include = fields.get("deviations"), fields.get("include")
-    if _is_absent(deviations) or not as_truth("deviations", deviations):
+def with_std(fields: Mapping[str, object]) -> dict[str, object]:
+    """Returns the fields with `"std"` in `include` instead of the argument `std`."""
+    others = {name: value for name, value in fields.items() if name != "std"}
+    deviations, include = fields.get("std"), fields.get("include")
+    if _is_absent(deviations) or not as_truth("std", deviations):
         return others
     wanted = [] if _is_absent(include) else as_words("include", include, MeshInclude)
     return {**others, "include": list(dict.fromkeys([*wanted, MeshInclude.DEVIATIONS.value]))}
@@ -196,23 +197,23 @@ def free_parameter(name: str, value: object, sizes: Sizes) -> dict[str, object]:
     return normalise({"parameter": None, "min": None, "max": None, **value}, FREE_PARAMETER, sizes, f"{name}.")
 
 
-def geometry(name: str, value: object, sizes: Sizes) -> dict[str, object]:
+def surface(name: str, value: object, sizes: Sizes) -> dict[str, object]:
     """Applies the rule for the surface of an operator."""
     if isinstance(value, Diagnostics):
         is_local = value.solver is SolverUsed.LOCAL  # takes neither, but chooses them by its likelihood
         fit = {} if is_local else {"kernel": value.kernel, "alpha": value.alpha}
         value = {"cloud": value, **fit, "solver": value.solver}
-    elif isinstance(value, GeneratedGeometry):
+    elif isinstance(value, GeneratedSurface):
         # UNSET here means that the caller gave nothing, not that diagnostics have none.
-        value = {field: None if _is_absent(said := getattr(value, field)) else said for field in GEOMETRY}
-    elif hasattr(value, "surface"):
-        value = {field: getattr(value, field) for field in GEOMETRY}
+        value = {field: None if _is_absent(said := getattr(value, field)) else said for field in SURFACE}
+    elif hasattr(value, "model"):
+        value = {field: getattr(value, field) for field in SURFACE}
     elif not isinstance(value, Mapping):
         value = {"cloud": value}
     if not _is_absent(value.get("cloud")):
         n, d = getattr(value["cloud"], "n_points", None), sizes.get("d")
         sizes = {axis: length for axis, length in {"n": n, "d": d}.items() if length is not None}
-    return normalise(value, GEOMETRY, sizes, f"{name}.")
+    return normalise(value, SURFACE, sizes, f"{name}.")
 
 
 def cloud(name: str, value: object, sizes: Sizes) -> dict[str, object]:  # noqa: ARG001
@@ -266,7 +267,7 @@ FIT: Mapping[str, Rule] = {
     "solver": word(*SolverChoice, *SolverUsed),
 }
 
-GEOMETRY: Mapping[str, Rule] = {**FIT, "cloud": cloud, "surface": word(*SurfaceChoice)}
+SURFACE: Mapping[str, Rule] = {**FIT, "cloud": cloud, "model": word(*SurfaceModelChoice)}
 
 BOUNDS: Mapping[str, Rule] = {parameter.value: bounds for parameter in SelectionParameter}
 
@@ -293,9 +294,10 @@ REQUEST: Mapping[str, Rule] = {
     "samples": samples,
     "quantiles": array("quantiles"),
     "threshold": number,
-    "surface": word(*SurfaceChoice),
+    "of": word(*PosteriorOf),
+    "surface_model": word(*SurfaceModelChoice),
     "orientation": word(*OrientationChoice),
-    "geometry": geometry,
+    "surface": surface,
     "criterion": word(*SelectionCriterion),
     "vary": vary,
     "families": words(*KernelFamily),

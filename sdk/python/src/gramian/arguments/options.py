@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Any, TypedDict
 import numpy.typing as npt
 
 from .fit import (
-    Deviations,
+    Of,
+    Std,
+    SurfaceModel,
     Fit,
-    GeometryLike,
+    SurfaceLike,
     GeometryWord,
     Mean,
     MeshWord,
@@ -22,7 +24,6 @@ from .fit import (
     Orientation,
     Quality,
     Quantity,
-    Surface,
     ValuesFit,
     Whole,
 )
@@ -50,34 +51,34 @@ class SurfaceOperatorFit(SurfaceFit, total=False):
 
     Keys
     ----
-    geometry : Geometry, dict, Cloud or Diagnostics, optional
+    surface : Surface, dict, Cloud or Diagnostics, optional
         The surface, if it has another cloud or fit than the values. Options absent from it are those given
         here for the values, or else as `Cloud.normals` chooses them.
     """
 
-    geometry: GeometryLike | None
+    surface: SurfaceLike | None
 
 
 class OperatorFit(SurfaceOperatorFit, ValuesFit, total=False):
     """Options for fitting a function and a surface, as keywords: `cloud.laplace_beltrami(values, **fit)`."""
 
 
-class DeviationOptions(TypedDict, total=False):
+class StdOptions(TypedDict, total=False):
     """Standard deviations beside other results.
 
     Keys
     ----
     include : str or several, optional
-        Additional results: `"deviations"`. Nothing if absent.
-    deviations : bool, optional
-        True for standard deviations, as by `include="deviations"`.
+        Additional results: `"std"`. Nothing if absent.
+    std : bool, optional
+        True for standard deviations, as by `include="std"`.
     """
 
-    include: Deviations | Iterable[Deviations] | None
-    deviations: bool | None
+    include: Std | Iterable[Std] | None
+    std: bool | None
 
 
-class InterpolationOptions(DeviationOptions, ValuesFit, total=False):
+class InterpolationOptions(StdOptions, ValuesFit, total=False):
     """Options of functions through values.
 
     Keys
@@ -95,21 +96,25 @@ class PosteriorOptions(ValuesFit, total=False):
     Keys
     ----
     include : str or several, optional
-        Additional results beside the means: `"variance"`, `"observation_variance"`, `"covariance"`,
+        Additional results beside the means: `"variances"`, `"observation_variances"`, `"covariance"`,
         `"gradients"`, `"gradient_variances"`, `"log_marginal_likelihood"`. Nothing if absent.
     samples : int or dict, optional
         Number of functions to draw from each posterior, jointly at all queries, or
         `{"count": 10, "seed": 1}`.
     quantiles : array_like, `[q]`, optional
-        Probabilities between 0 and 1 for which to return quantiles of the latent functions.
+        Probabilities between 0 and 1 for which to return quantiles.
     threshold : float, optional
-        Threshold of `exceedance_probabilities`, V: the probabilities that a new observation exceeds it.
+        Threshold of `exceedance_probabilities`, V.
+    of : str, optional
+        What samples, quantiles and probabilities are of: the `"function"` (if absent), or an `"observation"`,
+        which has the noise `alpha` as well.
     """
 
     include: Quantity | Iterable[Quantity] | None
     samples: Whole | Mapping[str, Whole] | None
     quantiles: npt.ArrayLike | None
     threshold: Number | None
+    of: Of | None
 
 
 class SurfaceOptions(SurfaceFit, total=False):
@@ -118,19 +123,19 @@ class SurfaceOptions(SurfaceFit, total=False):
     Keys
     ----
     include : str or several, optional
-        Additional results: `"deviations"`, `"edge_normals"`. Nothing if absent.
-    deviations : bool, optional
-        True for standard deviations, as by `include="deviations"`. They come from local regressions, unless
-        `kernel`, `alpha`, `surface` or `solver` say otherwise.
-    surface : str, optional
-        `"signature"`, `"offset"` or `"local"` to allow only that function. `"auto"` if absent.
+        Additional results: `"std"`, `"edge_normals"`. Nothing if absent.
+    std : bool, optional
+        True for standard deviations, as by `include="std"`. They come from local regressions, unless
+        `kernel`, `alpha`, `surface_model` or `solver` say otherwise.
+    surface_model : str, optional
+        `"signature"`, `"offset"` or `"regression"` to allow only that function. `"auto"` if absent.
     orientation : str, optional
         `"outward"` (if absent), or `"gradient"` for the side given by the gradient of u.
     """
 
     include: GeometryWord | Iterable[GeometryWord] | None
-    deviations: bool | None
-    surface: Surface | None
+    std: bool | None
+    surface_model: SurfaceModel | None
     orientation: Orientation | None
 
 
@@ -139,8 +144,8 @@ class MeshOptions(SurfaceFit, total=False):
 
     Keys
     ----
-    surface : str, optional
-        `"signature"` or `"local"` to allow only that function. `"auto"` if absent.
+    surface_model : str, optional
+        `"signature"` or `"regression"` to allow only that function. `"auto"` if absent.
     orientation : str, optional
         `"outward"` (if absent), or `"gradient"` for the side given by the gradient of u.
     mean : str, optional
@@ -156,13 +161,13 @@ class MeshOptions(SurfaceFit, total=False):
     open : bool, optional
         True for a surface that ends where its points end. False if absent: a closed mesh bridges holes.
     include : str or several, optional
-        What else is known of the vertices: `"curvatures"`, `"deviations"` of positions, normals and
+        What else is known of the vertices: `"curvatures"`, `"std"` of positions, normals and
         curvatures. Nothing if absent.
-    deviations : bool, optional
-        True for standard deviations, as by `include="deviations"`.
+    std : bool, optional
+        True for standard deviations, as by `include="std"`.
     """
 
-    surface: Surface | None
+    surface_model: SurfaceModel | None
     orientation: Orientation | None
     mean: Mean | None
     step: Number | None
@@ -170,8 +175,8 @@ class MeshOptions(SurfaceFit, total=False):
     quality: Quality | None
     open: bool | None
     include: MeshWord | Iterable[MeshWord] | None
-    deviations: bool | None
+    std: bool | None
 
 
-class OperatorOptions(DeviationOptions, OperatorFit, total=False):
+class OperatorOptions(StdOptions, OperatorFit, total=False):
     """Options of operators that are applied to values."""

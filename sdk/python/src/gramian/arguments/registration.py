@@ -13,7 +13,7 @@ from ..wire.connection import Connection
 from ..wire.problems import UnknownCloud
 from ..wire.tensors import JSON, PLY, Array
 from ..wire.transport import about
-from .normalise import REQUEST, Rule, normalise, with_deviations
+from .normalise import REQUEST, Rule, normalise, with_std
 
 T = TypeVar("T")
 
@@ -84,12 +84,12 @@ class RegisteredCloud:
         The request is then repeated once: the ids in it are still right.
         """
         sizes = {"n": self.n_points, "d": self.dimension}
-        request = {"cloud": {"id": self.id}, **normalise(with_deviations(fields), rules, sizes)}
+        request = {"cloud": {"id": self.id}, **normalise(with_std(fields), rules, sizes)}
         placed = partial(read, positions=_read_only(request.get("queries", self._points)))
         try:
             return self._connection.compute(path, request, placed, self.id)
         except UnknownCloud:
-            if not self._post_again(self, _cloud_of(fields.get("geometry"))):
+            if not self._post_again(self, _cloud_of(fields.get("surface"))):
                 raise
         return self._connection.compute(path, request, placed, self.id)
 
@@ -110,10 +110,10 @@ class RegisteredCloud:
         return self._points is not None or self._file is not None
 
 
-def _cloud_of(geometry: object) -> RegisteredCloud | None:
-    """Returns the cloud of a geometry in any form, or None if it has no cloud or only an id."""
-    inner = geometry.get("cloud") if isinstance(geometry, Mapping) else getattr(geometry, "cloud", None)
-    return next((cloud for cloud in (geometry, inner) if isinstance(cloud, RegisteredCloud)), None)
+def _cloud_of(surface: object) -> RegisteredCloud | None:
+    """Returns the cloud of a surface in any form, or None if it has no cloud or only an id."""
+    inner = surface.get("cloud") if isinstance(surface, Mapping) else getattr(surface, "cloud", None)
+    return next((cloud for cloud in (surface, inner) if isinstance(cloud, RegisteredCloud)), None)
 
 
 def register(connection: Connection, points: Array, normals: Array | None, cloud_id: str | None = None) -> models.Cloud:

@@ -4,7 +4,7 @@ n is the number of points of the cloud, d their dimension, m the number of queri
 and V that of the values. Nothing is computed until Dask is asked to: `dask.compute(answer)` returns the same object
 with NumPy arrays, and computes each tile once for all of its arrays.
 
-`reasons` says in a word why an answer is missing or doubtful, `[n]`, as in `gramian.DegenerateReason`.
+`reasons` says in a word why an answer is missing or doubtful, `[n]`, as in `gramian.FlagReason`.
 `uncertain_orientation` stands where the side of the surface is nearly a matter of chance, and nothing for all others.
 """
 
@@ -34,7 +34,7 @@ class Normals:
         `[n, d]`, of length 1, outward.
     levels
         `[n]`. 1 minus the height of the point above the surface, L.
-    normal_deviations
+    normal_std
         `[n]`, radians. Standard deviation of the angle of the normal: 95 % of the angles lie within 1.96 of it.
     reasons
         `[n]`, text.
@@ -42,7 +42,7 @@ class Normals:
 
     normals: da.Array
     levels: da.Array
-    normal_deviations: da.Array | None
+    normal_std: da.Array | None
     reasons: da.Array
 
 
@@ -58,7 +58,7 @@ class Curvatures(Normals):
         `[n]`, 1/L. The average of the principal curvatures.
     gaussian_curvatures
         `[n]`, 1/L^(d − 1). Their product.
-    principal_curvature_deviations, mean_curvature_deviations, gaussian_curvature_deviations
+    principal_curvature_std, mean_curvature_std, gaussian_curvature_std
         Standard deviations of these, in the same shapes.
     """
 
@@ -66,9 +66,9 @@ class Curvatures(Normals):
     principal_directions: da.Array
     mean_curvatures: da.Array
     gaussian_curvatures: da.Array
-    principal_curvature_deviations: da.Array | None
-    mean_curvature_deviations: da.Array | None
-    gaussian_curvature_deviations: da.Array | None
+    principal_curvature_std: da.Array | None
+    mean_curvature_std: da.Array | None
+    gaussian_curvature_std: da.Array | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,16 +83,16 @@ class Interpolation:
         `[m, d]`, V/L. ∇u, with `derivatives` of 1 or 2.
     hessians
         `[m, d, d]`, V/L². D²u, with `derivatives` of 2.
-    value_deviations, gradient_deviations, hessian_deviations
-        Standard deviations of these given the values, of the same shapes, with `deviations`.
+    value_std, gradient_std, hessian_std
+        Standard deviations of these given the values, of the same shapes, with `std`.
     """
 
     values: da.Array
     gradients: da.Array | None
     hessians: da.Array | None
-    value_deviations: da.Array | None
-    gradient_deviations: da.Array | None
-    hessian_deviations: da.Array | None
+    value_std: da.Array | None
+    gradient_std: da.Array | None
+    hessian_std: da.Array | None
 
 
 @dataclass(frozen=True, eq=False)

@@ -90,15 +90,15 @@ class Kriging:
 
     law: Law
     derivatives: int  # 0, 1 or 2
-    deviations: bool
+    std: bool
 
     def kinds(self, dimension: int) -> dict[str, Array]:
         """Returns empty arrays of the shapes of the answers, by name."""
         shapes = {"values": (), "gradients": (dimension,), "hessians": (dimension, dimension)}
         names = list(shapes)[: self.derivatives + 1]
         kinds = {name: np.empty((0, *shapes[name])) for name in names}
-        if self.deviations:
-            kinds |= {f"{name[:-1]}_deviations": np.empty((0, *shapes[name])) for name in names}
+        if self.std:
+            kinds |= {f"{name[:-1]}_std": np.empty((0, *shapes[name])) for name in names}
         return kinds
 
     def krige(self, replicas: Replicas, number: int, core: Part, rims: Sequence[Part], queries: Part) -> Rows:
@@ -113,7 +113,7 @@ class Kriging:
                 left,
                 queries.points,
                 derivatives=self.derivatives,
-                deviations=self.deviations,
+                std=self.std,
                 kernel=law.kernel,
                 alpha=law.alpha,
                 mean="zero",

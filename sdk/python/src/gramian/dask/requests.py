@@ -10,7 +10,7 @@ from scipy.sparse import csr_matrix
 
 from ..answers import Curvatures, Normals
 from ..client import Client
-from ..rest.models import Degenerate
+from ..rest.models import Flag
 from ..tiles.replicas import Replicas
 from ..wire.tensors import Array
 from .cells.cut import Ints
@@ -22,11 +22,11 @@ NO_REASONS = np.empty(0, dtype="U24")
 UNCERTAIN_ORIENTATION = "uncertain_orientation"
 """The side of a connected piece is nearly a matter of chance."""
 
-NOT_PER_POINT = ("surfaces", "gradient_norms", "degenerate", "diagnostics", "fit")
+NOT_PER_POINT = ("surface_models", "gradient_norms", "flags", "diagnostics", "fit")
 """Members of answers that tiles do not have."""
 
 
-def surface(replicas: Replicas, tile: SurfaceTile, sides: Sides, whole: Whole, what: str, deviations: bool) -> Rows:
+def surface(replicas: Replicas, tile: SurfaceTile, sides: Sides, whole: Whole, what: str, std: bool) -> Rows:
     """Asks for normals or curvatures at the points of a cell. `sides` are those of the regions of its tile."""
     if len(tile.own) == 0:
         return {}
@@ -34,11 +34,11 @@ def surface(replicas: Replicas, tile: SurfaceTile, sides: Sides, whole: Whole, w
     def call(client: Client) -> Normals | Curvatures:
         cloud = client.cloud(tile.part.points, tile.directions)
         ask = cloud.normals if what == "normals" else cloud.curvatures
-        return ask(solver="local", deviations=deviations, hyperparameters=whole.hyperparameters)
+        return ask(solver="local", std=deviations, hyperparameters=whole.hyperparameters)
 
     answer = replicas.ask(tile.number, call)
     labels, (signs, are_doubtful) = tile.labels[tile.own], sides
-    reasons = _reasons(answer.degenerate, tile)
+    reasons = _reasons(answer.flags, tile)
     reasons[(reasons == "") & are_doubtful[labels]] = UNCERTAIN_ORIENTATION
     arrays = {name: array for name, array in vars(answer).items() if name not in NOT_PER_POINT and array is not None}
     return {"index": tile.rows, "reasons": reasons, **_turned(arrays, tile.own, signs[labels])}
@@ -49,16 +49,16 @@ def operator(replicas: Replicas, tile: SurfaceTile, whole: Whole, what: str, n_p
     if len(tile.own) == 0:
         return {}
 
-    def call(client: Client) -> tuple[Sequence[csr_matrix], tuple[Degenerate, ...]]:
+    def call(client: Client) -> tuple[Sequence[csr_matrix], tuple[Flag, ...]]:
         cloud, known = client.cloud(tile.part.points, tile.directions), whole.hyperparameters
         if what == "laplace_beltrami":
             of_values = cloud.laplace_beltrami_sparse_matrix(solver="local", hyperparameters=known)
-            return [of_values.matrix], of_values.degenerate
+            return [of_values.matrix], of_values.flags
         of_gradients = cloud.surface_gradient_sparse_matrix(solver="local", hyperparameters=known)
-        return of_gradients.matrices, of_gradients.degenerate
+        return of_gradients.matrices, of_gradients.flags
 
-    matrices, degenerate = replicas.ask(tile.number, call)
-    rows: Rows = {"index": tile.rows, "reasons": _reasons(degenerate, tile)}
+    matrices, flags = replicas.ask(tile.number, call)
+    rows: Rows = {"index": tile.rows, "reasons": _reasons(flags, tile)}
     for component, matrix in enumerate(matrices):
         own = matrix[tile.own]
         entries = (own.data, tile.part.index[own.indices], own.indptr)
@@ -85,8 +85,8 @@ def _turned(arrays: Mapping[str, Array], rows: Ints, signs: Array) -> dict[str, 
     return found
 
 
-def _reasons(degenerate: tuple[Degenerate, ...], tile: SurfaceTile) -> npt.NDArray[np.str_]:
+def _reasons(flags: tuple[Flag, ...], tile: SurfaceTile) -> npt.NDArray[np.str_]:
     """Returns why answers at the points of the cell are doubtful."""
     reasons = np.zeros(len(tile.part), dtype=NO_REASONS.dtype)
-    reasons[[entry.query for entry in degenerate]] = [entry.reason.value for entry in degenerate]
+    reasons[[entry.query for entry in flags]] = [entry.reason.value for entry in flags]
     return reasons[tile.own]

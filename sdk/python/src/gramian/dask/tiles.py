@@ -58,12 +58,12 @@ class Tiles:
         """Says in which tile each point is, `[n]`, from 0."""
         return self._points.map_blocks(self.plan.cut.cells_of, drop_axis=1, dtype=np.int64)
 
-    def normals(self, *, deviations: bool = False) -> answers.Normals:
-        """Computes unit normals at the points, outward as the coarse cloud has it, with `deviations` if asked for."""
+    def normals(self, *, std: bool = False) -> answers.Normals:
+        """Computes unit normals at the points, outward as the coarse cloud has it, with `std` if asked for."""
         return answers.named(answers.Normals, self._of_surface("normals", deviations))
 
-    def curvatures(self, *, deviations: bool = False) -> answers.Curvatures:
-        """Computes curvatures at the points, with `deviations` if asked for; a sphere of radius r has +1/r."""
+    def curvatures(self, *, std: bool = False) -> answers.Curvatures:
+        """Computes curvatures at the points, with `std` if asked for; a sphere of radius r has +1/r."""
         return answers.named(answers.Curvatures, self._of_surface("curvatures", deviations))
 
     def laplace_beltrami(self) -> answers.SparseOperator:
@@ -80,7 +80,7 @@ class Tiles:
         queries: npt.ArrayLike | da.Array | None = None,
         *,
         derivatives: int = 0,
-        deviations: bool = False,
+        std: bool = False,
         kernel: KernelLike | None = None,
         alpha: Number | None = None,
         mean: Mean | None = None,
@@ -106,7 +106,7 @@ class Tiles:
         found = graph.gathered(asks, asked.chunks[0], kriging.kinds(self.plan.dimension))
         return answers.named(answers.Interpolation, found)
 
-    def _of_surface(self, what: str, deviations: bool) -> dict[str, da.Array]:
+    def _of_surface(self, what: str, std: bool) -> dict[str, da.Array]:
         surface, ask = self._in_tiles(), dask.delayed(requests.surface, pure=True)
         pairs = zip(surface.tiles, surface.sides, strict=True)
         rows = [ask(self._replicas, tile, sides, surface.whole, what, deviations) for tile, sides in pairs]
@@ -118,7 +118,7 @@ class Tiles:
             shapes |= {f"{name}s": shape for name, shape in known.items()}
             shapes |= {"principal_directions": (d - 1, d), "normals": (d,)}
         if deviations:
-            shapes |= {f"{name}_deviations": shape for name, shape in known.items()}
+            shapes |= {f"{name}_std": shape for name, shape in known.items()}
         kinds = {name: np.empty((0, *shape)) for name, shape in shapes.items()}
         return graph.gathered(rows, self._points.chunks[0], {**kinds, "reasons": requests.NO_REASONS})
 

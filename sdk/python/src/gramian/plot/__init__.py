@@ -8,7 +8,7 @@ was drawn.
 >>> from gramian.plot import SurfaceDisplay
 >>> angles = np.arange(64) * np.pi / 32
 >>> circle = gramian.Client().cloud(np.column_stack([2 * np.cos(angles), np.sin(angles)]))
->>> display = SurfaceDisplay.from_answer(circle.curvatures(deviations=True)).plot()
+>>> display = SurfaceDisplay.from_answer(circle.curvatures(std=True)).plot()
 >>> display.axes_.get_title()
 'mean curvatures'
 """

@@ -33,7 +33,7 @@ class PosteriorDisplay:
     ) -> None:
         self.places = np.asarray(places, dtype=np.float64)
         self.means = means
-        self.deviations = deviations
+        self.std = deviations
         self.samples = samples
 
     @classmethod
@@ -53,15 +53,15 @@ class PosteriorDisplay:
             if answer.positions.shape[1] == 1:
                 places = answer.positions[:, 0]
         deviations = None if answer.variances is None else np.sqrt(answer.variances)
-        return cls(places, answer.means, deviations=deviations, samples=answer.samples)
+        return cls(places, answer.means, std=deviations, samples=answer.samples)
 
     def plot(self, ax: Any = None, *, colour: str = "C0") -> Self:  # noqa: ANN401 (Axes)
         """Draws mean, band and samples."""
         axes = needed("matplotlib.pyplot", "plot").subplots()[1] if ax is None else ax
         order = np.argsort(self.places, kind="stable")
         places = self.places[order]
-        if self.deviations is not None:
-            low, high = (self.means + sign * BAND * self.deviations for sign in (-1, 1))
+        if self.std is not None:
+            low, high = (self.means + sign * BAND * self.std for sign in (-1, 1))
             axes.fill_between(places, low[order], high[order], color=colour, alpha=0.25, linewidth=0, label="95 %")
         for sample in [] if self.samples is None else self.samples:
             axes.plot(places, sample[order], color=colour, alpha=0.4, linewidth=0.7)

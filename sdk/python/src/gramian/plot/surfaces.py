@@ -50,7 +50,7 @@ class SurfaceDisplay:
     ) -> None:
         self.positions = np.asarray(positions, dtype=np.float64)
         self.values = np.asarray(values, dtype=np.float64)
-        self.deviations = deviations
+        self.std = deviations
         self.normals = normals
         self.name = name
         self.is_signed = is_signed
@@ -82,7 +82,7 @@ class SurfaceDisplay:
         return cls(
             places,
             values,
-            deviations=deviations_of(answer, name),
+            std=deviations_of(answer, name),
             normals=answer.normals,
             name=name.replace("_", " "),
             is_signed=name.endswith("curvatures"),
@@ -121,7 +121,7 @@ class SurfaceDisplay:
             limits or limits_of(self.values, is_signed=self.is_signed),
             cmap or ("RdYlBu_r" if self.is_signed else "viridis"),
         )
-        colours = colours_of(self.mappable_, self.values, self.deviations if suppress else None)
+        colours = colours_of(self.mappable_, self.values, self.std if suppress else None)
         if self.positions.shape[1] == 2:
             self._draw_flat(axes, colours)
         else:
@@ -172,7 +172,7 @@ class LevelSetDisplay:
     ) -> None:
         self.mesh = mesh
         self.values = values
-        self.deviations = deviations
+        self.std = deviations
         self.name = name
 
     @classmethod
@@ -184,7 +184,7 @@ class LevelSetDisplay:
             raise ValueError(f"the answer has no {name}")
         if values.ndim == 2:
             values = values[:, 0]
-        return cls(answer, values, deviations=deviations_of(answer, name), name=name.replace("_", " "))
+        return cls(answer, values, std=deviations_of(answer, name), name=name.replace("_", " "))
 
     def plot(
         self,
@@ -200,7 +200,7 @@ class LevelSetDisplay:
         is_signed = self.name.endswith("curvatures")
         known = limits or limits_of(self.values, is_signed=is_signed)
         self.mappable_ = mappable_of(known, cmap or ("RdYlBu_r" if is_signed else "viridis"))
-        colours = colours_of(self.mappable_, self.values, self.deviations)
+        colours = colours_of(self.mappable_, self.values, self.std)
         cells = self.mesh.cells
         if cells.shape[1] == 2:
             _draw_segments(axes, self.mesh.vertices[cells], colours[cells].mean(axis=1))
@@ -221,7 +221,7 @@ def default_quantity(answer: object) -> str:
 
 def deviations_of(answer: object, quantity: str) -> Array | None:
     """Returns the standard deviations of a quantity, if the answer has them."""
-    found: Array | None = getattr(answer, f"{quantity.removesuffix('s')}_deviations", None)
+    found: Array | None = getattr(answer, f"{quantity.removesuffix('s')}_std", None)
     return found if found is None or found.ndim == 1 else found[:, 0]
 
 

@@ -84,7 +84,7 @@ class BatchesOnCloud(RegisteredCloud):
         >>> line = gramian.Client().cloud([[0], [1], [2], [3]])
         >>> kernel = gramian.Kernel("gauss", length_scale=1)
         >>> lists = [[0, 1, 0, 1], [4, 3, 2, 1]]
-        >>> answer = line.posterior_batch(lists, [[1], [9]], include="variance", kernel=kernel, alpha=0.01)
+        >>> answer = line.posterior_batch(lists, [[1], [9]], include="variances", kernel=kernel, alpha=0.01)
         >>> answer.means.round(2) + 0.0, answer.variances.round(2)
         (array([[0.98, 0.  ],
                [2.99, 0.  ]]), array([0.01, 1.  ]))

@@ -42,7 +42,7 @@ class OperatorsOnCloud(RegisteredCloud):
         Returns
         -------
         SurfaceGradient
-            `gradients` at the queries, NaN where there is none. `degenerate` says why.
+            `gradients` at the queries, NaN where there is none. `flags` says why.
 
         Examples
         --------
@@ -73,7 +73,7 @@ class OperatorsOnCloud(RegisteredCloud):
         Returns
         -------
         SurfaceGradientMatrix
-            `matrices`, `[d, m, n]`. Rows are NaN where there is no gradient, and `degenerate` says why.
+            `matrices`, `[d, m, n]`. Rows are NaN where there is no gradient, and `flags` says why.
 
         Examples
         --------
@@ -104,7 +104,7 @@ class OperatorsOnCloud(RegisteredCloud):
         -------
         SurfaceGradientSparseMatrix
             `matrices`, d matrices of type `scipy.sparse.csr_matrix` and shape `[m, n]`. Rows have no entries
-            where there is no gradient, and `degenerate` says why.
+            where there is no gradient, and `flags` says why.
 
         Raises
         ------
@@ -143,14 +143,14 @@ class OperatorsOnCloud(RegisteredCloud):
         Returns
         -------
         LaplaceBeltrami
-            `values` of Δu at the queries, NaN where there is none. `degenerate` says why.
+            `values` of Δu at the queries, NaN where there is none. `flags` says why.
 
         Examples
         --------
         >>> angles = np.arange(8) * np.pi / 4
         >>> circle = gramian.Client().cloud(np.column_stack([np.cos(angles), np.sin(angles)]))
         >>> kernel = gramian.Kernel("gauss", length_scale=2)
-        >>> circle.laplace_beltrami(np.cos(angles), [[0.8, 0.6]], kernel=kernel).values.round(3)
+        >>> circle.laplace_beltrami(np.cos(angles), [[0.8, 0.6]], kernel=kernel).laplacians.round(3)
         array([-0.8])
         """
         return self._compute(
@@ -174,7 +174,7 @@ class OperatorsOnCloud(RegisteredCloud):
         Returns
         -------
         LaplaceBeltramiMatrix
-            `matrix`, `[m, n]`. Rows are NaN where there is no value, and `degenerate` says why.
+            `matrix`, `[m, n]`. Rows are NaN where there is no value, and `flags` says why.
 
         Examples
         --------
@@ -205,7 +205,7 @@ class OperatorsOnCloud(RegisteredCloud):
         -------
         LaplaceBeltramiSparseMatrix
             `matrix`, a `scipy.sparse.csr_matrix` of shape `[m, n]`. Rows have no entries where there is no
-            value, and `degenerate` says why.
+            value, and `flags` says why.
 
         Raises
         ------

@@ -40,7 +40,7 @@ class SurfaceOfCloud(RegisteredCloud):
         Returns
         -------
         Normals
-            `normals` at the queries, NaN where there is none, and `degenerate` says why. `normal_deviations`
+            `normals` at the queries, NaN where there is none, and `flags` says why. `normal_std`
             if requested.
 
         Examples
@@ -51,7 +51,7 @@ class SurfaceOfCloud(RegisteredCloud):
         >>> answer.normals.round(3)
         array([[0.8, 0.6],
                [nan, nan]])
-        >>> [(entry.query, entry.reason.value) for entry in answer.degenerate]
+        >>> [(entry.query, entry.reason.value) for entry in answer.flags]
         [(1, 'vanishing_gradient')]
         """
         return self._compute(Normals.read, "/v1/normals", GEOMETRIC, queries=queries, sites=sites, **options)
@@ -71,7 +71,7 @@ class SurfaceOfCloud(RegisteredCloud):
         -------
         Curvatures
             `principal_curvatures`, `mean_curvatures`, `gaussian_curvatures` and more at the queries, NaN
-            where there are none, and `degenerate` says why. Standard deviations of each if requested.
+            where there are none, and `flags` says why. Standard deviations of each if requested.
 
         Examples
         --------
@@ -85,8 +85,8 @@ class SurfaceOfCloud(RegisteredCloud):
 
         >>> noise = 0.01 * np.random.default_rng(0).normal(size=(64, 1))
         >>> noisy = gramian.Client().cloud((5 + noise) * np.column_stack([np.cos(angles), np.sin(angles)]))
-        >>> answer = noisy.curvatures([[5, 0]], deviations=True)
-        >>> answer.mean_curvatures.round(3), answer.mean_curvature_deviations.round(3)
+        >>> answer = noisy.curvatures([[5, 0]], std=True)
+        >>> answer.mean_curvatures.round(3), answer.mean_curvature_std.round(3)
         (array([0.202]), array([0.004]))
         """
         return self._compute(Curvatures.read, "/v1/curvatures", GEOMETRIC, queries=queries, **options)

@@ -75,7 +75,7 @@ class ValuesOfCloud(RegisteredCloud):
         --------
         >>> line = gramian.Client().cloud([[0], [1], [2], [3]])
         >>> kernel = gramian.Kernel("gauss", length_scale=1)
-        >>> answer = line.posterior([0, 1, 0, 1], [[1], [9]], include="variance", kernel=kernel, alpha=0.01)
+        >>> answer = line.posterior([0, 1, 0, 1], [[1], [9]], include="variances", kernel=kernel, alpha=0.01)
         >>> answer.means.round(2) + 0.0, answer.variances.round(2)
         (array([0.98, 0.  ]), array([0.01, 1.  ]))
         >>> answer = line.posterior([0, 1, 0, 1], [[1]], kernel=kernel, alpha=0.01, samples=3, quantiles=[0.05, 0.95])

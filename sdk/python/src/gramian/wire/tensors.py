@@ -127,9 +127,9 @@ class Members:
         """Returns the shape of what may be null in an array, since all of it may be."""
         if name in ("matrix", "matrices"):
             return (self.diagnostics.n_points,)
-        if name in ("normals", "gradients", "gradient_deviations"):
+        if name in ("normals", "gradients", "gradient_std"):
             return (self.diagnostics.dimension,)
-        if name in ("principal_curvatures", "principal_curvature_deviations"):
+        if name in ("principal_curvatures", "principal_curvature_std"):
             return (self.diagnostics.dimension - 1,)
         if name == "principal_directions":
             return (self.diagnostics.dimension - 1, self.diagnostics.dimension)

@@ -31,7 +31,7 @@ const MUCH_DROPPED: f64 = 0.05;
 struct AtVertices {
     principal: Option<Array>,
     mean: Option<Array>,
-    position_deviations: Option<Array>,
+    position_std: Option<Array>,
     deviations: Option<DeviationArrays>,
 }
 
@@ -81,7 +81,7 @@ pub fn of_surface(
             at.mean = Some(found.per_query(curvatures.mean, &[k]));
         }
         let heights = found.geometry.deviations().map(|known| known.height.clone());
-        at.position_deviations = heights.map(|heights| found.known_per_query(heights, &[k]));
+        at.position_std = heights.map(|heights| found.known_per_query(heights, &[k]));
         at.deviations = found.deviations();
         diagnostics = found.diagnostics(fits);
     }
@@ -128,7 +128,7 @@ pub fn of_values(
         // To first order, a vertex moves by the deviation of u over its slope.
         let slope = |vertex: usize| found.jets.gradient(vertex).iter().map(|g| g * g).sum::<f64>().sqrt();
         let moved = deviations.values.iter().enumerate().map(|(vertex, deviation)| deviation / slope(vertex));
-        at.position_deviations = Some(null_unless_finite(moved.collect()));
+        at.position_std = Some(null_unless_finite(moved.collect()));
     }
     answer(work, meshed, at, diagnostics)
 }
@@ -248,10 +248,10 @@ fn answer(
         residuals: null_unless_finite(residuals),
         principal_curvatures: at.principal,
         mean_curvatures: at.mean,
-        position_deviations: at.position_deviations,
-        normal_deviations: normal,
-        principal_curvature_deviations: principal,
-        mean_curvature_deviations: mean,
+        position_std: at.position_std,
+        normal_std: normal,
+        principal_curvature_std: principal,
+        mean_curvature_std: mean,
         parts: parts.into_iter().map(MeshPart::from).collect(),
         dropped_parts: dropped.into_iter().map(MeshPart::from).collect(),
         closedness: meshed.closedness,

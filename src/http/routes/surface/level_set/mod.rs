@@ -7,7 +7,7 @@ mod plan;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::http::fields::{Diagnostics, MeanChoice, OrientationChoice, SurfaceChoice, request};
+use crate::http::fields::{Diagnostics, MeanChoice, OrientationChoice, SurfaceModelChoice, request};
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
@@ -41,7 +41,7 @@ pub enum MeshInclude {
     /// Principal and mean curvatures at the vertices.
     Curvatures,
     /// Standard deviations of the positions of the vertices, and of their normals and curvatures.
-    Deviations,
+    Std,
 }
 
 /// A box that a surface is followed in.
@@ -67,7 +67,7 @@ request! {
         /// The level of the function through `values`. Default: the median of the values.
         pub level: Option<f64>,
         /// The function whose level set is the surface. Default: `auto`.
-        pub surface: Option<SurfaceChoice>,
+        pub surface_model: Option<SurfaceModelChoice>,
         /// The direction of normals, and so the order of the vertices of a cell. Default: `outward`.
         pub orientation: Option<OrientationChoice>,
         /// The longest edge of the lattice that follows the surface. Default: the median spacing of the
@@ -141,13 +141,13 @@ answer! {
         /// The standard deviation of each vertex along its normal, in the unit of the points.
         ///
         /// Null where it is not known.
-        position_deviations: Option<Array> as Option<Vec<Option<f64>>>,
+        position_std: Option<Array> as Option<Vec<Option<f64>>>,
         /// The standard deviation of the angle of the normal at each vertex, radians.
-        normal_deviations: Option<Array> as Option<Vec<Option<f64>>>,
+        normal_std: Option<Array> as Option<Vec<Option<f64>>>,
         /// Standard deviations of the principal curvatures at each vertex, 1/length.
-        principal_curvature_deviations: Option<Array> as Option<Vec<Option<Vec<f64>>>>,
+        principal_curvature_std: Option<Array> as Option<Vec<Option<Vec<f64>>>>,
         /// Standard deviations of the mean curvatures, 1/length.
-        mean_curvature_deviations: Option<Array> as Option<Vec<Option<f64>>>,
+        mean_curvature_std: Option<Array> as Option<Vec<Option<f64>>>,
         /// The connected parts of the mesh, largest first.
         parts: Vec<MeshPart>,
         /// Parts that were left out: no point is near them, they have too few points of their own, or they

@@ -130,12 +130,12 @@ impl LevelSetRequest {
     fn asked(&mut self) -> AskedOfVertices {
         let include = self.include.take().unwrap_or_default();
         let has_curvatures = include.contains(&MeshInclude::Curvatures);
-        let has_deviations = include.contains(&MeshInclude::Deviations);
-        let geometry = geometry_request(self.surface, self.orientation, has_curvatures, None);
+        let has_deviations = include.contains(&MeshInclude::Std);
+        let geometry = geometry_request(self.surface_model, self.orientation, has_curvatures, None);
         let mut geometry = GeometryRequest { has_deviations, ..geometry };
         if self.open == Some(true) && geometry.model == SurfaceModel::Auto {
             // The level of a signature function goes around the end of a surface.
-            geometry.model = SurfaceModel::Local;
+            geometry.model = SurfaceModel::Regression;
         }
         AskedOfVertices { geometry, has_curvatures }
     }

@@ -54,19 +54,19 @@ answer! {
         /// Present if `derivatives` is 2.
         hessians: Option<Array> as Option<Vec<Vec<Vec<Vec<f64>>>>>,
         /// Standard deviation of each function at each query, given its values. Present if `include` has
-        /// `deviations`.
+        /// `std`.
         ///
         /// The kernel is taken as covariance, and alpha as variance of the noise. All lists have the same
         /// deviations.
-        value_deviations: Option<Array> as Option<Vec<f64>>,
+        value_std: Option<Array> as Option<Vec<f64>>,
         /// Standard deviation of each component of ∇u at each query.
         ///
-        /// Present if `include` has `deviations` and `derivatives` is 1 or 2.
-        gradient_deviations: Option<Array> as Option<Vec<Vec<f64>>>,
+        /// Present if `include` has `std` and `derivatives` is 1 or 2.
+        gradient_std: Option<Array> as Option<Vec<Vec<f64>>>,
         /// Standard deviation of each entry of D²u at each query.
         ///
-        /// Present if `include` has `deviations` and `derivatives` is 2.
-        hessian_deviations: Option<Array> as Option<Vec<Vec<Vec<f64>>>>,
+        /// Present if `include` has `std` and `derivatives` is 2.
+        hessian_std: Option<Array> as Option<Vec<Vec<Vec<f64>>>>,
         /// The mean of each function, a row per list. Absent if the mean is 0.
         ///
         /// A row is the constant, followed by a slope per coordinate if the mean is linear.
@@ -129,15 +129,14 @@ impl Operation for InterpolationBatchRequest {
         diagnostics.warn_of_clamping(clamped);
         let Work { queries, derivatives, .. } = work;
         let (k, m, d) = (batch.solutions.len(), queries.n_points(), queries.dimension());
-        let [value_deviations, gradient_deviations, hessian_deviations] =
-            arrays(deviations, &queries, derivatives);
+        let [value_std, gradient_std, hessian_std] = arrays(deviations, &queries, derivatives);
         Ok(InterpolationBatchResponse {
             values: Array::new(jets.values, &[k, m]),
             gradients: (derivatives >= 1).then(|| Array::new(jets.gradients, &[k, m, d])),
             hessians: (derivatives >= 2).then(|| Array::new(jets.hessians, &[k, m, d, d])),
-            value_deviations,
-            gradient_deviations,
-            hessian_deviations,
+            value_std,
+            gradient_std,
+            hessian_std,
             mean_coefficients,
             diagnostics,
         })

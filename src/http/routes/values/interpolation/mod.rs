@@ -51,18 +51,18 @@ answer! {
         gradients: Option<Array> as Option<Vec<Vec<f64>>>,
         /// D²u at each query, unit of the values per length squared. Present if `derivatives` is 2.
         hessians: Option<Array> as Option<Vec<Vec<Vec<f64>>>>,
-        /// Standard deviation of u at each query, given the values. Present if `include` has `deviations`.
+        /// Standard deviation of u at each query, given the values. Present if `include` has `std`.
         ///
         /// The kernel is taken as covariance, and alpha as variance of the noise.
-        value_deviations: Option<Array> as Option<Vec<f64>>,
+        value_std: Option<Array> as Option<Vec<f64>>,
         /// Standard deviation of each component of ∇u at each query.
         ///
-        /// Present if `include` has `deviations` and `derivatives` is 1 or 2.
-        gradient_deviations: Option<Array> as Option<Vec<Vec<f64>>>,
+        /// Present if `include` has `std` and `derivatives` is 1 or 2.
+        gradient_std: Option<Array> as Option<Vec<Vec<f64>>>,
         /// Standard deviation of each entry of D²u at each query.
         ///
-        /// Present if `include` has `deviations` and `derivatives` is 2.
-        hessian_deviations: Option<Array> as Option<Vec<Vec<Vec<f64>>>>,
+        /// Present if `include` has `std` and `derivatives` is 2.
+        hessian_std: Option<Array> as Option<Vec<Vec<Vec<f64>>>>,
         /// The numbers used, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
     }
@@ -135,9 +135,9 @@ impl Operation for InterpolationRequest {
             values: Array::new(jets.values(), &[m]),
             gradients: (work.derivatives >= 1).then(|| Array::new(jets.gradients(), &[m, d])),
             hessians: (work.derivatives >= 2).then(|| Array::new(jets.hessians(), &[m, d, d])),
-            value_deviations: of_values,
-            gradient_deviations: of_gradients,
-            hessian_deviations: of_hessians,
+            value_std: of_values,
+            gradient_std: of_gradients,
+            hessian_std: of_hessians,
             diagnostics,
         })
     }
@@ -155,7 +155,7 @@ fn order_of(derivatives: u8) -> JetOrder {
 }
 
 fn has_deviations(include: Option<Vec<ValuesInclude>>) -> bool {
-    include.is_some_and(|include| include.contains(&ValuesInclude::Deviations))
+    include.is_some_and(|include| include.contains(&ValuesInclude::Std))
 }
 
 /// Returns how many numbers a query has: value, gradient and Hessian, up to the order of `derivatives`.

@@ -1,7 +1,7 @@
 //! `POST /v1/posterior/batch`: Gaussian process posteriors of many lists of values, with one factorization.
 
 use super::work::{Asked, Found, Work};
-use super::{PosteriorQuantity, Samples};
+use super::{PosteriorOf, PosteriorQuantity, Samples};
 use crate::http::fields::{Diagnostics, Fit, MeanChoice, request};
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
@@ -29,16 +29,20 @@ request! {
         pub queries: Option<Points>,
         /// Optional parts of the answer beside the means. Default: none.
         pub include: Option<Vec<PosteriorQuantity>>,
-        /// Joint draws of each latent function at all queries. Default: none.
+        /// Joint draws at all queries for each list. Default: none.
         pub samples: Option<Samples>,
-        /// Probabilities between 0 and 1 for quantiles of the latent functions. Default: none.
+        /// Probabilities between 0 and 1 for quantiles. Default: none.
         ///
         /// An empty list counts as absent.
         #[serde(default, deserialize_with = "present_unless_empty")]
         #[schema(max_items = 1000)]
         pub quantiles: Option<Vec<f64>>,
-        /// The threshold of `exceedance_probabilities` for a new observation, unit of the values.
+        /// The threshold of `exceedance_probabilities`, unit of the values.
         pub threshold: Option<f64>,
+        /// What samples, quantiles and probabilities of exceedance are of. Default: `function`.
+        ///
+        /// `observation` needs `alpha`: with `noise_variances` the noise at queries is unknown.
+        pub of: Option<PosteriorOf>,
     }
 }
 
@@ -59,11 +63,11 @@ answer! {
         gradients: Option<Array> as Option<Vec<Vec<Vec<f64>>>>,
         /// The variances of the components of the latent functions' gradients at each query.
         gradient_variances: Option<Array> as Option<Vec<Vec<f64>>>,
-        /// Draws of the latent function for each list. A draw is a row, with a number per query.
+        /// Draws of what `of` names for each list. A draw is a row, with a number per query.
         samples: Option<Array> as Option<Vec<Vec<Vec<f64>>>>,
-        /// Quantiles of the latent function for each list. A probability is a row, with a number per query.
+        /// Quantiles of what `of` names for each list. A probability is a row, with a number per query.
         quantiles: Option<Array> as Option<Vec<Vec<Vec<f64>>>>,
-        /// The probability that a new observation exceeds `threshold` at each query, a row per list.
+        /// The probability that what `of` names exceeds `threshold` at each query, a row per list.
         exceedance_probabilities: Option<Array> as Option<Vec<Vec<f64>>>,
         /// The log marginal likelihood of each list, −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
         log_marginal_likelihoods: Option<Vec<f64>>,
@@ -96,8 +100,9 @@ impl Operation for PosteriorBatchRequest {
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let given = value_lists(std::mem::take(&mut self.values))?;
         let fit = Fit { mean: self.mean, ..self.take_fit() };
-        let Self { include, samples, quantiles, threshold, queries, .. } = self;
-        let asked = Asked { include: include.unwrap_or_default(), samples, quantiles, threshold };
+        let Self { include, samples, quantiles, threshold, of, queries, .. } = self;
+        let (include, of) = (include.unwrap_or_default(), of.unwrap_or_default());
+        let asked = Asked { include, samples, quantiles, threshold, of };
         Work::plan(planner, fit, given, queries, asked)
     }
 

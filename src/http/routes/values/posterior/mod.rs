@@ -25,9 +25,9 @@ use work::{Asked, Found, Work};
 #[serde(rename_all = "snake_case")]
 pub enum PosteriorQuantity {
     /// The variance of the latent function at each query.
-    Variance,
+    Variances,
     /// The variance of a new observation at each query: the variance of the latent function plus alpha.
-    ObservationVariance,
+    ObservationVariances,
     /// The covariance of the latent function between queries.
     Covariance,
     /// The gradient of the mean at each query.
@@ -36,6 +36,17 @@ pub enum PosteriorQuantity {
     GradientVariances,
     /// The logarithm of the probability density of the values.
     LogMarginalLikelihood,
+}
+
+/// The random quantity that samples, quantiles and probabilities are of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PosteriorOf {
+    /// The latent function.
+    #[default]
+    Function,
+    /// A new observation: the latent function plus independent noise of variance alpha.
+    Observation,
 }
 
 /// Functions to draw from the posterior: their number and a seed.
@@ -67,16 +78,20 @@ request! {
         pub queries: Option<Points>,
         /// Optional parts of the answer beside the mean. Default: none.
         pub include: Option<Vec<PosteriorQuantity>>,
-        /// Joint draws of the latent function at all queries. Default: none.
+        /// Joint draws at all queries. Default: none.
         pub samples: Option<Samples>,
-        /// Probabilities between 0 and 1 for quantiles of the latent function. Default: none.
+        /// Probabilities between 0 and 1 for quantiles. Default: none.
         ///
         /// An empty list counts as absent.
         #[serde(default, deserialize_with = "present_unless_empty")]
         #[schema(max_items = 1000)]
         pub quantiles: Option<Vec<f64>>,
-        /// The threshold of `exceedance_probabilities` for a new observation, unit of the values.
+        /// The threshold of `exceedance_probabilities`, unit of the values.
         pub threshold: Option<f64>,
+        /// What samples, quantiles and probabilities of exceedance are of. Default: `function`.
+        ///
+        /// `observation` needs `alpha`: with `noise_variances` the noise at queries is unknown.
+        pub of: Option<PosteriorOf>,
     }
 }
 
@@ -95,11 +110,11 @@ answer! {
         gradients: Option<Array> as Option<Vec<Vec<f64>>>,
         /// The variances of the components of the latent function's gradient at each query.
         gradient_variances: Option<Array> as Option<Vec<Vec<f64>>>,
-        /// Draws of the latent function. A draw is a row, with a number per query.
+        /// Draws of what `of` names. A draw is a row, with a number per query.
         samples: Option<Array> as Option<Vec<Vec<f64>>>,
-        /// Quantiles of the latent function. A probability is a row, with a number per query.
+        /// Quantiles of what `of` names. A probability is a row, with a number per query.
         quantiles: Option<Array> as Option<Vec<Vec<f64>>>,
-        /// The probability that a new observation exceeds `threshold`, at each query.
+        /// The probability that what `of` names exceeds `threshold`, at each query.
         exceedance_probabilities: Option<Array> as Option<Vec<f64>>,
         /// The log marginal likelihood of the values, −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
         log_marginal_likelihood: Option<f64>,
@@ -133,8 +148,9 @@ impl Operation for PosteriorRequest {
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let given = GivenValues::one(std::mem::take(&mut self.values));
         let fit = Fit { mean: self.mean, ..self.take_fit() };
-        let Self { include, samples, quantiles, threshold, queries, .. } = self;
-        let asked = Asked { include: include.unwrap_or_default(), samples, quantiles, threshold };
+        let Self { include, samples, quantiles, threshold, of, queries, .. } = self;
+        let (include, of) = (include.unwrap_or_default(), of.unwrap_or_default());
+        let asked = Asked { include, samples, quantiles, threshold, of };
         Work::plan(planner, fit, given, queries, asked)
     }
 

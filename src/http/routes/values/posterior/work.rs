@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{PosteriorQuantity as Q, Samples};
+use super::{PosteriorOf, PosteriorQuantity as Q, Samples};
 use crate::http::fields::{Diagnostics, Fit};
 use crate::http::problem::Problem;
 use crate::http::serve::answers::values::mean_coefficients;
@@ -35,6 +35,8 @@ pub struct Asked {
     pub samples: Option<Samples>,
     pub quantiles: Option<Vec<f64>>,
     pub threshold: Option<f64>,
+    /// The random quantity that samples, quantiles and probabilities are of.
+    pub of: PosteriorOf,
 }
 
 impl Asked {
@@ -45,7 +47,7 @@ impl Asked {
     /// Returns whether the variance at each query is needed.
     fn needs_variances(&self) -> bool {
         let has_bands = self.quantiles.is_some() || self.threshold.is_some();
-        has_bands || self.wants(Q::Variance) || self.wants(Q::ObservationVariance)
+        has_bands || self.wants(Q::Variances) || self.wants(Q::ObservationVariances)
     }
 
     fn needs_covariance(&self) -> bool {
@@ -98,10 +100,10 @@ impl Asked {
     /// Checks that the noise of a new observation is known if it is needed. It is known only if it is the
     /// same everywhere.
     fn check_noise(&self, plan: &PlannedValues) -> Result<(), Problem> {
-        let asked = if self.wants(Q::ObservationVariance) {
-            ("observation_variance", "/include")
-        } else if self.threshold.is_some() {
-            ("threshold", "/threshold")
+        let asked = if self.wants(Q::ObservationVariances) {
+            ("observation_variances", "/include")
+        } else if self.of == PosteriorOf::Observation {
+            ("observation", "/of")
         } else {
             return Ok(());
         };
@@ -259,10 +261,13 @@ impl Found {
         let clamped = clamped.or(deviations.as_ref().map(|deviations| &deviations.clamped));
         diagnostics.warn_of_clamping(clamped.map_or(&[], Vec::as_slice));
         let shape = |of_each: &[usize]| [&leading, of_each].concat();
+        // Alpha is absent with noise per point, and `check_noise` then refuses everything that needs it.
+        let alpha = diagnostics.alpha.unwrap_or_default();
+        let noise = if asked.of == PosteriorOf::Observation { alpha } else { 0.0 };
         let samples = match (asked.samples, &covariance) {
             (Some(samples), Some(covariance)) => {
                 let prior_variance = function()?.solver.kernel().at_zero() * scale;
-                let root = Root::of(covariance, prior_variance, observer).map_err(refused)?;
+                let root = Root::of(covariance, prior_variance, observer).map_err(refused)?.with_noise(noise);
                 let drawn = draws(&root, &jets.values, m, samples, observer).map_err(refused)?;
                 Some(Array::new(drawn, &shape(&[samples.count, m])))
             }
@@ -278,18 +283,16 @@ impl Found {
                     .push(log_marginal_likelihood(solver, solution, scale).map_err(refused)?);
             }
         }
-        let bands = Bands { asked, means: &jets.values, variances: variances.as_ref(), m };
-        // Alpha is absent with noise per point, and `check_noise` then refuses everything that needs it.
-        let alpha = diagnostics.alpha.unwrap_or_default();
+        let bands = Bands { asked, means: &jets.values, variances: variances.as_ref(), noise, m };
         Ok(Self {
-            variances: bands.variances(Q::Variance, 0.0),
-            observation_variances: bands.variances(Q::ObservationVariance, alpha),
+            variances: bands.variances(Q::Variances, 0.0),
+            observation_variances: bands.variances(Q::ObservationVariances, alpha),
             quantiles: bands
                 .quantiles(observer)
                 .map_err(refused)?
                 .map(|found| Array::new(found, &shape(&[asked.n_quantiles(), m]))),
             exceedance_probabilities: bands
-                .exceedances(alpha, observer)
+                .exceedances(observer)
                 .map_err(refused)?
                 .map(|found| Array::new(found, &shape(&[m]))),
             means: Array::new(jets.values, &shape(&[m])),
@@ -329,6 +332,8 @@ struct Bands<'a> {
     asked: &'a Asked,
     means: &'a [f64],
     variances: Option<&'a Variances>,
+    /// Variance added to those of the latent function.
+    noise: f64,
     m: usize,
 }
 
@@ -346,7 +351,7 @@ impl Bands<'_> {
         let (Some(variances), Some(levels)) = (self.variances, &self.asked.quantiles) else {
             return Ok(None);
         };
-        let deviations: Vec<f64> = variances.latent.iter().map(|v| v.sqrt()).collect();
+        let deviations: Vec<f64> = variances.latent.iter().map(|v| (v + self.noise).sqrt()).collect();
         let levels: Vec<f64> = levels.iter().map(|&p| quantile(p)).collect();
         let mut quantiles = Vec::with_capacity(self.means.len() * levels.len());
         for means in self.means.chunks_exact(self.m) {
@@ -358,18 +363,18 @@ impl Bands<'_> {
         Ok(Some(quantiles))
     }
 
-    /// Returns the probabilities `Φ((μ − t)/√(σ² + α))` of exceeding the threshold t, `[k, m]`.
+    /// Returns the probabilities `Φ((μ − t)/√(σ² + σ₀²))` of exceeding the threshold t, `[k, m]`, σ₀² the noise.
     ///
-    /// Where σ² + α is 0, the probability is 1 for means above the threshold, else 0.
+    /// Where σ² + σ₀² is 0, the probability is 1 for means above the threshold, else 0.
     ///
     /// # Errors
     /// `NumericsError::Cancelled`.
-    fn exceedances(&self, alpha: f64, observer: &dyn Observer) -> Result<Option<Vec<f64>>, NumericsError> {
+    fn exceedances(&self, observer: &dyn Observer) -> Result<Option<Vec<f64>>, NumericsError> {
         let (Some(variances), Some(threshold)) = (self.variances, self.asked.threshold) else {
             return Ok(None);
         };
         let of_one = |(mean, variance): (&f64, &f64)| {
-            let deviation = (variance + alpha).sqrt();
+            let deviation = (variance + self.noise).sqrt();
             if deviation > 0.0 {
                 cumulative((mean - threshold) / deviation)
             } else {

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from .coarse_response import CoarseResponse
     from .curvatures_request import CurvaturesRequest
     from .curvatures_response import CurvaturesResponse
-    from .degenerate import Degenerate
-    from .degenerate_reason import DegenerateReason
+    from .flags import Flag
+    from .flag_reason import FlagReason
     from .diagnostics import Diagnostics
     from .duplicate_policy import DuplicatePolicy
     from .estimate_request import EstimateRequest
@@ -119,8 +119,8 @@ __all__ = (
     "CoarseResponse",
     "CurvaturesRequest",
     "CurvaturesResponse",
-    "Degenerate",
-    "DegenerateReason",
+    "Flag",
+    "FlagReason",
     "Diagnostics",
     "DuplicatePolicy",
     "EstimateRequest",
@@ -218,8 +218,8 @@ if not TYPE_CHECKING:
         "CoarseResponse": ".coarse_response",
         "CurvaturesRequest": ".curvatures_request",
         "CurvaturesResponse": ".curvatures_response",
-        "Degenerate": ".degenerate",
-        "DegenerateReason": ".degenerate_reason",
+        "Flag": ".flags",
+        "FlagReason": ".flag_reason",
         "Diagnostics": ".diagnostics",
         "DuplicatePolicy": ".duplicate_policy",
         "EstimateRequest": ".estimate_request",

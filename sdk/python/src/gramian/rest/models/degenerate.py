@@ -6,19 +6,19 @@ from typing import Any, Self, TypeVar
 from attrs import define as _attrs_define
 from attrs import field as _attrs_field
 
-from ..models.degenerate_reason import DegenerateReason
+from ..models.flag_reason import FlagReason
 from ..types import without_unset
 
-T = TypeVar("T", bound="Degenerate")
+T = TypeVar("T", bound="Flag")
 
 
 @_attrs_define
-class Degenerate:
+class Flag:
     """A query where geometry has no meaning, or less accuracy than it seems.
 
     Attributes:
         query (int): The position of the query.
-        reason (DegenerateReason): The reason why a query is degenerate.
+        reason (FlagReason): The reason why a query is flags.
         gradient_norm (float): |∇| of the function used at the query.
 
             Its unit is 1/length for the signature function. It is about 1 for the offset model, and 0 where that
@@ -26,7 +26,7 @@ class Degenerate:
     """
 
     query: int
-    reason: DegenerateReason
+    reason: FlagReason
     gradient_norm: float
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
@@ -56,18 +56,18 @@ class Degenerate:
         d = dict(src_dict)
         query = d.pop("query")
 
-        reason = DegenerateReason(d.pop("reason"))
+        reason = FlagReason(d.pop("reason"))
 
         gradient_norm = d.pop("gradient_norm")
 
-        degenerate = cls(
+        flags = cls(
             query=query,
             reason=reason,
             gradient_norm=gradient_norm,
         )
 
-        degenerate.additional_properties = d
-        return degenerate
+        flags.additional_properties = d
+        return flags
 
     @property
     def additional_keys(self) -> list[str]:

@@ -1,7 +1,7 @@
 from enum import StrEnum
 
 
-class DegenerateReason(StrEnum):
+class FlagReason(StrEnum):
     AMBIGUOUS_SIDE = "ambiguous_side"
     EDGE = "edge"
     FAR_FROM_CLOUD = "far_from_cloud"

@@ -2,7 +2,7 @@ from enum import StrEnum
 
 
 class GeometryInclude(StrEnum):
-    DEVIATIONS = "deviations"
+    DEVIATIONS = "std"
     EDGE_NORMALS = "edge_normals"
 
     def __str__(self) -> str:

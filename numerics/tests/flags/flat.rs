@@ -4,7 +4,7 @@
 use gramian_numerics::kernel::{Family, WendlandSmoothness};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::surface::degeneracy::DegeneracyReason;
+use gramian_numerics::surface::flags::FlagReason;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, Orientation, SurfaceModel};
 
 use super::clouds::{Oriented, cylinder, flat_square, graph, half_sphere};
@@ -43,7 +43,7 @@ fn a_flat_square_has_no_curvature_and_one_normal() {
             let principal = geometry.curvatures(&Unobserved).unwrap().principal;
             let largest = principal.iter().fold(0.0, |a: f64, k| a.max(k.abs()));
             assert!(largest < 1e-8, "{family:?}: {largest:e}");
-            assert!(geometry.degenerate().is_empty(), "{family:?}: {:?}", geometry.degenerate());
+            assert!(geometry.flags().is_empty(), "{family:?}: {:?}", geometry.flags());
         }
     }
 }
@@ -84,7 +84,7 @@ fn check_curvatures(cloud: &Oriented, exact: [f64; 2], share_unflagged: f64, lab
         assert_eq!(n_wrong(&found), 0, "{label}, {family:?}");
         assert!(smallest_cosine(&found) > 0.9, "{label}, {family:?}: {}", smallest_cosine(&found));
         let principal = geometry.curvatures(&Unobserved).unwrap().principal;
-        let flags: Vec<usize> = geometry.degenerate().iter().map(|entry| entry.query).collect();
+        let flags: Vec<usize> = geometry.flags().iter().map(|entry| entry.query).collect();
         for query in (0..geometry.n_queries()).filter(|query| !flags.contains(query)) {
             for (k, exact_k) in principal[query * 2..][..2].iter().zip(exact) {
                 assert!((k - exact_k).abs() < 0.5 * exact[1], "{label}, {family:?}: {k} at {query}");
@@ -126,7 +126,7 @@ fn rescued_answers_scale_and_move_with_the_cloud() {
                 let error = (k * scale - sign * curvature).abs();
                 assert!(error < tolerance, "scale {scale}, shift {shift}: {k}, side {along}");
             }
-            assert!(geometry.degenerate().is_empty(), "scale {scale}, shift {shift}");
+            assert!(geometry.flags().is_empty(), "scale {scale}, shift {shift}");
         }
     }
 }
@@ -137,8 +137,8 @@ fn beyond_the_admitted_work_answers_are_null() {
     let surface = surface_of(&cloud, Family::Gauss, 1.0);
     let geometry = geometry(&surface, &GeometryRequest { max_offsets: 10, ..CURVATURES });
     assert!(geometry.is_null().iter().enumerate().all(|(query, &is_null)| is_null == (query >= 10)));
-    let reasons: Vec<DegeneracyReason> = geometry.degenerate().iter().map(|entry| entry.reason).collect();
-    assert_eq!(reasons, [DegeneracyReason::UnaffordableRescue; 134]);
+    let reasons: Vec<FlagReason> = geometry.flags().iter().map(|entry| entry.reason).collect();
+    assert_eq!(reasons, [FlagReason::UnaffordableRescue; 134]);
 }
 
 /// Normals of `Orientation::Gradient` point inward here, whichever function answers.
@@ -154,7 +154,7 @@ fn the_gradient_side_of_the_offset_model_is_that_of_the_signature_function() {
         let answered = geometry.is_null().iter().filter(|&&is_null| !is_null).count();
         assert!(inward == answered && answered > 290, "{model:?}: {inward} of {answered}");
         let principal = geometry.curvatures(&Unobserved).unwrap().principal;
-        let flagged: Vec<usize> = geometry.degenerate().iter().map(|entry| entry.query).collect();
+        let flagged: Vec<usize> = geometry.flags().iter().map(|entry| entry.query).collect();
         let unflagged = (0..300).filter(|query| !flagged.contains(query));
         for query in unflagged {
             assert!(principal[query * 2..][..2].iter().all(|k| (k + 1.0).abs() < 0.3), "{model:?}, {query}");

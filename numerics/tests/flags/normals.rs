@@ -56,7 +56,7 @@ pub fn tally(surface: ClosedSurface, at: usize, scale: f64, n: usize, noise: f64
     let request = GeometryRequest { checks_curvatures: false, ..GeometryRequest::CURVATURES };
     let geometry = Geometry::of(&surface, &cloud(&moved), &request, &Unobserved).unwrap();
     let mut is_flagged = vec![false; n];
-    geometry.degenerate().iter().for_each(|entry| is_flagged[entry.query] = true);
+    geometry.flags().iter().for_each(|entry| is_flagged[entry.query] = true);
     let mut tally = NormalTally { n_points: n, ..NormalTally::default() };
     for (i, &x) in points.iter().enumerate() {
         let truth = outward_normal(f, x);

@@ -41,7 +41,7 @@ fn answers(geometry: &Geometry, size: f64) -> (Vec<f64>, Vec<usize>) {
         numbers.extend(found.gaussian.iter().map(|deviation| deviation * size * size));
         numbers.extend(&found.normal);
     }
-    (numbers, geometry.degenerate().iter().map(|entry| entry.query).collect())
+    (numbers, geometry.flags().iter().map(|entry| entry.query).collect())
 }
 
 #[test]
@@ -84,9 +84,9 @@ fn two_sizes_in_one_cloud_are_right_from_the_nearest_points_and_flagged_from_all
         for (is_local, surface) in [(true, local(&cloud)), (false, dense(&cloud))] {
             let geometry = geometry(&surface, &cloud, false);
             let curvatures = geometry.curvatures(&Unobserved).unwrap();
-            let n_flagged = geometry.degenerate().len();
+            let n_flagged = geometry.flags().len();
             assert!(!is_local || n_flagged == 0, "{radius}: {n_flagged}");
-            let is_flagged = |i: usize| geometry.degenerate().iter().any(|entry| entry.query == i);
+            let is_flagged = |i: usize| geometry.flags().iter().any(|entry| entry.query == i);
             for i in (0..800).filter(|&i| !is_flagged(i)) {
                 let (centre, size) = if i < 400 { (0.0, 1.0) } else { (1.5, radius) };
                 let x = cloud.point(i);

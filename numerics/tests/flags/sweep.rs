@@ -10,7 +10,7 @@ use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::regression::function::interpolant::Interpolant;
 use gramian_numerics::surface::Surface;
-use gramian_numerics::surface::degeneracy::DegeneracyReason;
+use gramian_numerics::surface::flags::FlagReason;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
 use gramian_numerics::surface::local::{Given, LocalSurface};
 use gramian_numerics::surface::served::ServedBy;
@@ -142,7 +142,7 @@ impl Case {
         let radius = surface.cloud().radius();
         let mut tally = Tally { queries: places.len(), ..Tally::default() };
         let mut flags = vec![None; places.len()];
-        geometry.degenerate().iter().for_each(|entry| flags[entry.query] = Some(entry.reason));
+        geometry.flags().iter().for_each(|entry| flags[entry.query] = Some(entry.reason));
         for (query, &x) in places.iter().enumerate() {
             let (normal, exact) = (self.shape.normal(x), self.shape.curvatures(x));
             let found = &curvatures.principal[query * 2..][..2];
@@ -154,7 +154,7 @@ impl Case {
             let error = (found[0] - exact[0]).abs().max((found[1] - exact[1]).abs()) / largest;
             tally.offset += usize::from(geometry.served_by(query) == ServedBy::Offset);
             match flags[query] {
-                Some(reason) if DegeneracyReason::is_null(reason) => tally.null += 1,
+                Some(reason) if FlagReason::is_null(reason) => tally.null += 1,
                 Some(_) => {
                     tally.flagged += 1;
                     tally.caught_50 += usize::from(error > 0.5);

@@ -1,4 +1,4 @@
-//! Bounds of docs/degeneracy.md, checked by its sweep.
+//! Bounds of docs/flags.md, checked by its sweep.
 
 use gramian_numerics::surface::geometry::SurfaceModel;
 use rayon::prelude::*;
@@ -7,7 +7,7 @@ use super::closed::CLOSED_SURFACES;
 use super::normals::{NormalTally, tally};
 use super::sweep::{KERNELS, Tally, cases};
 
-/// Over 24,000 queries at each length scale and model. The bounds are those of docs/degeneracy.md.
+/// Over 24,000 queries at each length scale and model. The bounds are those of docs/flags.md.
 #[test]
 fn no_curvature_is_off_by_half_without_a_flag() {
     for (model, scale) in [(SurfaceModel::Signature, 0.4), (SurfaceModel::Auto, 1.0)] {
@@ -26,7 +26,7 @@ fn no_curvature_is_off_by_half_without_a_flag() {
 }
 
 /// Deviations, once there is noise, leave more than three times as many curvatures without a flag as T3 and
-/// T4 do. Fewer than one in a hundred of them are off by half (docs/degeneracy.md: 25 of 9,423).
+/// T4 do. Fewer than one in a hundred of them are off by half (docs/flags.md: 25 of 9,423).
 #[test]
 fn deviations_know_more_than_confirmations_once_there_is_noise() {
     let cases = cases().into_iter().filter(|case| case.kernel.0 == KERNELS[0].0).collect::<Vec<_>>();

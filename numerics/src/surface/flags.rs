@@ -11,9 +11,9 @@ use crate::points::sampling::Scales;
 use crate::regression::function::interpolant::Interpolant;
 use crate::regression::sums::jets::{JetOrder, Jets};
 
-/// The reason why a query is degenerate.
+/// The reason why a query has a flag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum DegeneracyReason {
+pub enum FlagReason {
     /// Null: ∇u is rounding (T1), small against the Hessian at the scale of the sampling (T2), or oblique to
     /// the surface. The offset model has no answer either.
     VanishingGradient,
@@ -34,7 +34,7 @@ pub enum DegeneracyReason {
     Edge,
 }
 
-impl DegeneracyReason {
+impl FlagReason {
     /// Returns whether the query has no answer at all.
     pub fn is_null(self) -> bool {
         match self {
@@ -50,9 +50,9 @@ impl DegeneracyReason {
 
 /// A query without an answer, or with a flag.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Degeneracy {
+pub struct Flag {
     pub query: usize,
-    pub reason: DegeneracyReason,
+    pub reason: FlagReason,
     /// Gradient norm of the function that was used. Unit 1/L for the signature function.
     pub gradient_norm: f64,
 }

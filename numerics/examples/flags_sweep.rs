@@ -1,15 +1,15 @@
-//! Prints the tables of docs/degeneracy.md: how many wrong and how many right
+//! Prints the tables of docs/flags.md: how many wrong and how many right
 //! curvatures and normals are flagged.
 
-#[path = "../tests/degeneracy/closed.rs"]
+#[path = "../tests/flags/closed.rs"]
 mod closed;
 #[path = "../tests/common/mod.rs"]
 mod common;
-#[path = "../tests/degeneracy/normals.rs"]
+#[path = "../tests/flags/normals.rs"]
 mod normals;
-#[path = "../tests/degeneracy/shapes.rs"]
+#[path = "../tests/flags/shapes.rs"]
 mod shapes;
-#[path = "../tests/degeneracy/sweep.rs"]
+#[path = "../tests/flags/sweep.rs"]
 mod sweep;
 
 use gramian_numerics::surface::geometry::SurfaceModel;
