@@ -34,7 +34,7 @@ pub fn lists(max_points: usize, max_queries: usize, max_width: usize) -> Lists {
 /// Parses without limits and without an observer.
 pub fn unlimited() -> ParseContext<'static> {
     static LISTS: LazyLock<Lists> = LazyLock::new(|| lists(usize::MAX, usize::MAX, usize::MAX));
-    ParseContext { lists: &LISTS, observer: &Unobserved }
+    ParseContext { lists: &LISTS, renamed: &[], observer: &Unobserved }
 }
 
 /// A host with these settings, which keeps jobs in memory.
@@ -52,6 +52,6 @@ pub fn host_on(flags: &[&str], store: Option<Arc<Objects>>) -> Arc<Host> {
     let settings = Flags::parse_from([&["host", "--threads", "1"], flags].concat()).settings;
     let shares = Shares { intake: 32 << 20, body: 1 << 20, jobs: 8 << 20, work: 32 << 20 };
     let problems = catalogue::ALL.to_vec();
-    let guest = Guest { shares, lists: lists(100_000, 100, 16), problems, subject: None };
+    let guest = Guest { shares, lists: lists(100_000, 100, 16), renamed: &[], problems, subject: None };
     Host::new(settings, guest, store).unwrap()
 }

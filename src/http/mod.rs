@@ -3,6 +3,7 @@
 pub mod fields;
 pub mod openapi;
 pub mod problem;
+mod renamed;
 mod routes;
 pub mod serve;
 pub mod state;
@@ -69,7 +70,7 @@ pub fn router(app: Arc<App>) -> (Router, Runner) {
         .route("/docs", get(documentation::get_documentation))
         .route("/docs/", get(documentation::get_documentation_page))
         .route("/docs/{*path}", get(documentation::get_documentation_file))
-        .fallback(middleware::not_found)
+        .fallback(renamed::not_found)
         .method_not_allowed_fallback(middleware::method_not_allowed)
         .layer(recover())
         .layer(option_layer(app.settings.cors_origins.as_ref().map(cors)))

@@ -48,6 +48,7 @@ mod problems;
 mod process;
 mod protocol;
 mod refusals;
+mod renamed;
 mod repeated_rows;
 mod routes;
 mod settings;

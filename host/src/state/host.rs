@@ -15,6 +15,7 @@ use crate::problem::slug::Slug;
 use crate::problem::{Problem, catalogue};
 use crate::store::Objects;
 use crate::wire::read::limits::{Lists, ParseContext};
+use crate::wire::read::renamed::Renamed;
 use gramian_observer::Observer;
 
 /// Reason why the host does not start.
@@ -48,6 +49,8 @@ pub struct Guest {
     pub shares: Shares,
     /// Limits of the lists of its requests.
     pub lists: Lists,
+    /// Words of its requests that have another name now.
+    pub renamed: &'static [Renamed],
     /// Types of problems that it answers with, those of the host included.
     pub problems: Vec<Slug>,
     /// Header with the id of what a request is about, if the service has such ids. Proxies route by it.
@@ -119,7 +122,7 @@ impl Host {
 
     /// Limits and observer for parsing a body.
     pub fn context<'a>(&'a self, observer: &'a dyn Observer) -> ParseContext<'a> {
-        ParseContext { lists: &self.guest.lists, observer }
+        ParseContext { lists: &self.guest.lists, renamed: self.guest.renamed, observer }
     }
 
     /// 413 for work that takes more memory than there is for `owner`.

@@ -65,7 +65,7 @@ impl Limits {
 
 /// Parses with the given lists, and without an observer.
 pub fn unobserved(lists: &Lists) -> ParseContext<'_> {
-    ParseContext { lists, observer: &Unobserved }
+    ParseContext { lists, renamed: &[], observer: &Unobserved }
 }
 
 const ONE_PER_POINT: &str =

@@ -52,6 +52,8 @@ pub struct Pointers {
     pub regularization: &'static str,
     /// The queries, or the points that serve as queries.
     pub queries: &'static str,
+    /// The model of the surface.
+    pub surface_model: &'static str,
 }
 
 impl Pointers {
@@ -61,6 +63,7 @@ impl Pointers {
         kernel: "/kernel",
         regularization: "/alpha",
         queries: "/queries",
+        surface_model: "/surface_model",
     };
 
     /// Pointer to an entry of a list. A cloud given by id has no entries, so its pointer stays as it is.
@@ -121,8 +124,8 @@ pub fn from_numerics(error: NumericsError, pointers: Pointers) -> Problem {
         }
         E::KernelNotSmooth { query, .. } => {
             let remedy = format!(
-                "{detail}; use laplace with epsilon > 0 or matern with nu of 1.5 or more, query elsewhere, or ask for the \
-                 geometry of surface offset, which needs no gradient"
+                "{detail}; use laplace with epsilon > 0 or matern with nu of 1.5 or more, query elsewhere, or take the surface \
+                 model offset, which needs no gradient"
             );
             Problem::of_field(KERNEL_NOT_SMOOTH, Pointers::entry(pointers.queries, query), remedy)
         }
@@ -135,7 +138,7 @@ pub fn from_numerics(error: NumericsError, pointers: Pointers) -> Problem {
             not_positive_definite(reason, minimum_alpha, &detail, pointers)
         }
         E::OpenSurface { .. } => at(INVALID_REQUEST, "/open"),
-        E::UnsupportedMesh { .. } => at(INVALID_REQUEST, "/surface"),
+        E::UnsupportedMesh { .. } => at(INVALID_REQUEST, "/surface_model"),
         E::TooManyNodes { .. } => at(INVALID_REQUEST, "/step"),
         E::Unsupported { .. } => at(UNSUPPORTED_BY_SOLVER, "/solver"),
         E::RankTooLarge { .. } => {

@@ -9,6 +9,7 @@ use super::durable::Durable;
 use crate::config::Config;
 use crate::http::fields::limits::Limits;
 use crate::http::problem::{self, Problem};
+use crate::http::renamed;
 use crate::memory::Memory;
 use crate::store::clouds::CloudStore;
 use crate::store::key::CloudId;
@@ -73,6 +74,7 @@ impl App {
         let guest = Guest {
             shares: memory.shares,
             lists: Limits::of(&config).lists(),
+            renamed: &renamed::WORDS,
             problems: problem::all(),
             subject: Some(Subject {
                 header: CLOUD_HEADER,

@@ -6,6 +6,7 @@ pub mod limits;
 pub mod members;
 pub mod parse;
 pub mod points;
+pub mod renamed;
 
 mod ply;
 mod reader;

@@ -7,6 +7,7 @@ use serde_json::Error;
 
 use super::limits::ParseContext;
 use super::reader::{MAX_NESTING, Named, Reader, Stop, read, shortened};
+use super::renamed::Renamed;
 use crate::problem::Problem;
 use crate::problem::catalogue;
 
@@ -100,7 +101,9 @@ fn refusal(error: &Error, reader: Reader<'_>, context: &ParseContext<'_>) -> Pro
         (Err(error), _) => malformed_json(error.to_string()),
         (Ok(IgnoredAny), Some(flaw)) => malformed_json(flaw),
         (Ok(IgnoredAny), None) => {
-            Problem::invalid_request(failure.pointer, shortened(error.to_string().into()))
+            let detail = error.to_string();
+            let renamed = Renamed::refusal(context.renamed, &detail).unwrap_or(detail);
+            Problem::invalid_request(failure.pointer, shortened(renamed.into()))
         }
     }
 }
@@ -305,7 +308,7 @@ mod tests {
                 // Cancellation also works while entries are only counted.
                 for max_points in [usize::MAX, 10] {
                     let lists = lists(max_points, 1, 2);
-                    let context = ParseContext { lists: &lists, observer: &observer };
+                    let context = ParseContext { lists: &lists, renamed: &[], observer: &observer };
                     let problem = parse_json::<Request>(text.as_bytes(), &context).unwrap_err();
                     assert_eq!(problem.slug(), catalogue::DEADLINE_EXCEEDED);
                 }

@@ -112,6 +112,7 @@ pub(super) fn pointers_of_surface(surface: &Surface, request: Pointers) -> Point
             (None, Some(_)) => "/surface/alpha",
             (None, None) => request.regularization,
         },
+        surface_model: "/surface/model",
         ..request
     }
 }

@@ -170,7 +170,8 @@ impl<'a> Planner<'a> {
         let (n_points, dimension) = (on.stored.cloud.n_points(), on.stored.cloud.dimension());
         let given = options.given_process(on.pointers);
         if options.solver == SolverChoice::Local || request.model == SurfaceModel::Regression {
-            let pointer = if options.solver == SolverChoice::Local { "/solver" } else { "/surface" };
+            let pointer =
+                if options.solver == SolverChoice::Local { "/solver" } else { on.pointers.surface_model };
             if dimension > MAX_LOCAL_DIMENSION {
                 let detail = format!(
                     "local regressions serve surfaces in dimensions 2 to {MAX_LOCAL_DIMENSION}, the cloud has {dimension}"
@@ -179,7 +180,7 @@ impl<'a> Planner<'a> {
             }
             if let Some(pointer) = given {
                 let detail = "local regressions choose kernel and noise by their likelihood; leave this out, or take \
-                              \"surface\": \"signature\"";
+                              the surface model \"signature\"";
                 return Err(Problem::of_field(catalogue::UNSUPPORTED_BY_SOLVER, pointer, detail));
             }
             return Ok(Regressed::Locally(None));

@@ -72,9 +72,8 @@ impl LevelSetRequest {
         }
         let asked = self.asked();
         if asked.geometry.model == SurfaceModel::Offset {
-            let detail =
-                "the offset model has another function at each query, and so no level set; leave surface out";
-            return Err(Problem::invalid_request("/surface", detail));
+            let detail = "the offset model has another function at each query, and so no level set; leave surface_model out";
+            return Err(Problem::invalid_request("/surface_model", detail));
         }
         let main = planner.surface_fit(self.take_fit(), Purpose::LevelSets, &asked.geometry)?;
         let size = self.checked_size(&main.on, false)?;
