@@ -76,7 +76,7 @@ const ASKED = [
   "epsilon",
   "alpha",
   "solver",
-  "surface",
+  "surfaceModel",
   "duplicates",
 ];
 

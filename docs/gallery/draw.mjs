@@ -13,7 +13,7 @@ const base = `${process.env.GRAMIAN_URL}/`;
 
 const LAPLACE = (epsilon) => `family=laplace&lengthScale=1&epsilon=${epsilon}`;
 const GAUSS = "family=gauss&lengthScale=1";
-const PLANE = "operation=normals&deviations=false&surface=signature&section=2&arrows=true";
+const PLANE = "operation=normals&std=false&surfaceModel=signature&section=2&arrows=true";
 
 const SCENES = [
   ["curve", `example=curve&${PLANE}&${LAPLACE(1)}`, "A closed curve from 64 of its points. Laplace's kernel, ε = 1."],
@@ -46,7 +46,7 @@ const SCENES = [
   ["noisier", `example=noisier&${PLANE}&${LAPLACE(1)}&alpha=0.1`, "Points that were moved by up to 0.25, ε = 1."],
   ["torus-random", "example=torus", "Mean curvatures on a torus, 2,000 random points."],
   ["torus-lattice", "example=lattice", "The same on 1,500 points of a lattice."],
-  ["sphere", "example=ball&surface=signature&deviations=false", "Mean curvatures on a sphere, 600 points; they are 1."],
+  ["sphere", "example=ball&surfaceModel=signature&std=false", "Mean curvatures on a sphere, 600 points; they are 1."],
 ];
 
 const GRAPHICS = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];

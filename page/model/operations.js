@@ -21,7 +21,7 @@ export function requestOf(settings) {
   /** @type {Record<string, any>} */
   const request = {};
   const include = [];
-  if (settings.deviations) include.push("std");
+  if (settings.std) include.push("std");
   if (settings.operation === "mesh") {
     include.unshift("curvatures");
     if (settings.quality !== "regular") request.quality = settings.quality;
@@ -29,7 +29,7 @@ export function requestOf(settings) {
     if (settings.step > 0) request.step = settings.step;
   }
   if (include.length > 0) request.include = include;
-  if (settings.surface !== "auto") request.surface = settings.surface;
+  if (settings.surfaceModel !== "auto") request.surface_model = settings.surfaceModel;
   if (settings.solver !== "auto") request.solver = settings.solver;
   if (settings.duplicates !== "refuse") request.duplicates = settings.duplicates;
   if (settings.alpha > 0) request.alpha = settings.alpha;
@@ -49,11 +49,11 @@ const NAMES = {
   gradient_norms: "gradient of u",
   levels: "level of u",
   residuals: "distance from the level",
-  position_std: "deviation of the position",
-  normal_std: "deviation of the normal",
-  principal_curvature_std: "deviation of a principal curvature",
-  mean_curvature_std: "deviation of the mean curvature",
-  gaussian_curvature_std: "deviation of the Gaussian curvature",
+  position_std: "standard deviation of the position",
+  normal_std: "standard deviation of the normal",
+  principal_curvature_std: "standard deviation of a principal curvature",
+  mean_curvature_std: "standard deviation of the mean curvature",
+  gaussian_curvature_std: "standard deviation of the Gaussian curvature",
 };
 
 /** Vectors, which are drawn and not coloured by, and what is no quantity of a point. */
@@ -91,8 +91,8 @@ export function quantitiesOf(answer, cloud) {
       of.push({ id: `given.${name}`, title: `${name} (given)`, unit: "", isSigned: false, values });
     }
   }
-  // Mean curvature first, deviations last.
-  const rank = ({ id }) => (id === "mean_curvatures" ? 0 : id.includes("deviation") ? 2 : 1);
+  // Mean curvature first, standard deviations last.
+  const rank = ({ id }) => (id === "mean_curvatures" ? 0 : id.endsWith("_std") || id.includes("_std.") ? 2 : 1);
   return of.sort((a, b) => rank(a) - rank(b));
 }
 
@@ -128,7 +128,7 @@ export function remedyOf({ slug, problem }, settings) {
   if (pointer === "/step" && settings.step > 0) return { label: "Choose the step automatically", set: { step: 0 } };
   if (slug === "kernel-not-smooth") return { label: "Choose the kernel automatically", set: { family: "auto" } };
   if (["unsupported-by-solver", "problem-too-large"].includes(slug)) {
-    return { label: "Let the service choose", set: { solver: "auto", surface: "auto", family: "auto", alpha: 0 } };
+    return { label: "Let the service choose", set: { solver: "auto", surfaceModel: "auto", family: "auto", alpha: 0 } };
   }
   if (slug === "invalid-request" && pointer.startsWith("/kernel")) {
     return { label: "Choose the kernel automatically", set: { family: "auto", lengthScale: 0, epsilon: 0 } };

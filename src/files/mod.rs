@@ -61,7 +61,7 @@ pub struct OfCloud {
     output: PathBuf,
     /// Add standard deviations.
     #[arg(long)]
-    deviations: bool,
+    std: bool,
     /// Further members of the request as JSON, such as '{"alpha": 1e-6, "duplicates": "merge"}'.
     #[arg(long, value_name = "JSON")]
     with: Option<String>,
@@ -122,7 +122,7 @@ async fn of_cloud(operation: &str, of: &OfCloud, config: Config) -> Result<(), F
         Some(text) => serde_json::from_str(text)
             .map_err(|error| Failure::Argument(format!("--with is not a JSON object: {error}")))?,
     };
-    if of.deviations {
+    if of.std {
         let include = request.entry("include").or_insert(json!([])).as_array_mut();
         let include = include.ok_or_else(|| Failure::Argument("--with: include is not a list".to_owned()))?;
         if !include.contains(&json!("std")) {

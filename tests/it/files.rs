@@ -64,7 +64,7 @@ fn a_scan_becomes_curvatures_normals_and_a_mesh() {
     let folder = Folder::new("scan");
     folder.write("scan.xyz", &sphere(300));
     for (arguments, begins) in [
-        (["curvatures", "scan.xyz", "-o", "curvatures.ply", "--deviations"].as_slice(), "ply"),
+        (["curvatures", "scan.xyz", "-o", "curvatures.ply", "--std"].as_slice(), "ply"),
         (&["normals", "scan.xyz", "-o", "normals.json"], "{"),
         (&["mesh", "scan.xyz", "-o", "scan.glb"], "glTF"),
         (&["mesh", "scan.xyz", "-o", "scan.obj", "--with", r#"{"quality": "raw"}"#], "v "),

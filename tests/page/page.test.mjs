@@ -173,7 +173,7 @@ test("a dropped file is read, and a parameter changes the answer", () =>
 
 test("a refusal has a remedy, and a button that applies it", () =>
   opened(
-    "#example=ellipse&family=laplace&surface=signature",
+    "#example=ellipse&family=laplace&surfaceModel=signature",
     async (page) => {
       await page.click("text=Choose the kernel automatically");
       await settled(page);
@@ -242,14 +242,14 @@ test("a hostile link and a hostile file put nothing into the snippets", () => {
   const link = new URLSearchParams({
     example: "ball",
     solver: text,
-    surface: text,
+    surfaceModel: text,
     family: text,
     operation: text,
     duplicates: text,
   });
   return opened(`#${link}`, async (page) => {
     await settled(page);
-    for (const name of ["solver", "surface_model", "family"]) assert.equal(await page.inputValue(`[name=${name}]`), "auto");
+    for (const name of ["solver", "surfaceModel", "family"]) assert.equal(await page.inputValue(`[name=${name}]`), "auto");
     await open(
       page,
       `${text}.ply`,

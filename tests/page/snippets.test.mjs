@@ -47,7 +47,7 @@ function check({ address, fileName, operation = "curvatures", request, cloudId =
 test("the words of the page are those of the document", () => {
   const lists = {
     solver: "SolverChoice",
-    surface: "SurfaceChoice",
+    surfaceModel: "SurfaceModelChoice",
     duplicates: "DuplicatePolicy",
     quality: "MeshQuality",
   };
@@ -65,7 +65,7 @@ test("links choose among the words of the page, and nothing else", () => {
   }
   for (const [name, text] of [
     ["solver", "iterative"],
-    ["surface_model", "offset"],
+    ["surfaceModel", "offset"],
     ["family", "laplace"],
     ["quality", "raw"],
   ]) {
@@ -91,7 +91,7 @@ test("snippets ask for what is on screen", () => {
 for (const language of Object.keys(LANGUAGES)) {
   test(`a hostile link changes nothing of what a snippet in ${language} does`, () => {
     for (const text of HOSTILE) {
-      const hash = `#${new URLSearchParams({ solver: text, surface: text, family: text, operation: text })}`;
+      const hash = `#${new URLSearchParams({ solver: text, surfaceModel: text, family: text, operation: text })}`;
       const request = requestOf(fromHash(hash, words));
       const given = { address: "http://localhost:8080/", cloudId: "0", operation: "curvatures", request };
       assert.deepEqual(request, { include: ["std"] });
