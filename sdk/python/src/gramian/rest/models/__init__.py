@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from .coarse_response import CoarseResponse
     from .curvatures_request import CurvaturesRequest
     from .curvatures_response import CurvaturesResponse
-    from .flags import Flag
-    from .flag_reason import FlagReason
     from .diagnostics import Diagnostics
     from .duplicate_policy import DuplicatePolicy
     from .estimate_request import EstimateRequest
@@ -23,8 +21,9 @@ if TYPE_CHECKING:
     from .factorization_used import FactorizationUsed
     from .family_score import FamilyScore
     from .field_error import FieldError
+    from .flag import Flag
+    from .flag_reason import FlagReason
     from .free_parameter import FreeParameter
-    from .geometry import Geometry
     from .geometry_include import GeometryInclude
     from .health import Health
     from .hyperparameters import Hyperparameters
@@ -72,6 +71,7 @@ if TYPE_CHECKING:
     from .path_entry import PathEntry
     from .posterior_batch_request import PosteriorBatchRequest
     from .posterior_batch_response import PosteriorBatchResponse
+    from .posterior_of import PosteriorOf
     from .posterior_quantity import PosteriorQuantity
     from .posterior_request import PosteriorRequest
     from .posterior_response import PosteriorResponse
@@ -89,7 +89,7 @@ if TYPE_CHECKING:
     from .solver_used import SolverUsed
     from .spacing import Spacing
     from .stencils_used import StencilsUsed
-    from .surface_choice import SurfaceChoice
+    from .surface import Surface
     from .surface_gradient_matrix_request import SurfaceGradientMatrixRequest
     from .surface_gradient_matrix_response import SurfaceGradientMatrixResponse
     from .surface_gradient_request import SurfaceGradientRequest
@@ -100,7 +100,8 @@ if TYPE_CHECKING:
     from .surface_gradient_sparse_matrix_response import (
         SurfaceGradientSparseMatrixResponse,
     )
-    from .surface_used import SurfaceUsed
+    from .surface_model_choice import SurfaceModelChoice
+    from .surface_model_used import SurfaceModelUsed
     from .tile_regions import TileRegions
     from .values_include import ValuesInclude
     from .version import Version
@@ -119,8 +120,6 @@ __all__ = (
     "CoarseResponse",
     "CurvaturesRequest",
     "CurvaturesResponse",
-    "Flag",
-    "FlagReason",
     "Diagnostics",
     "DuplicatePolicy",
     "EstimateRequest",
@@ -128,8 +127,9 @@ __all__ = (
     "FactorizationUsed",
     "FamilyScore",
     "FieldError",
+    "Flag",
+    "FlagReason",
     "FreeParameter",
-    "Geometry",
     "GeometryInclude",
     "Health",
     "Hyperparameters",
@@ -173,6 +173,7 @@ __all__ = (
     "PathEntry",
     "PosteriorBatchRequest",
     "PosteriorBatchResponse",
+    "PosteriorOf",
     "PosteriorQuantity",
     "PosteriorRequest",
     "PosteriorResponse",
@@ -190,14 +191,15 @@ __all__ = (
     "SolverUsed",
     "Spacing",
     "StencilsUsed",
-    "SurfaceChoice",
+    "Surface",
     "SurfaceGradientMatrixRequest",
     "SurfaceGradientMatrixResponse",
     "SurfaceGradientRequest",
     "SurfaceGradientResponse",
     "SurfaceGradientSparseMatrixRequest",
     "SurfaceGradientSparseMatrixResponse",
-    "SurfaceUsed",
+    "SurfaceModelChoice",
+    "SurfaceModelUsed",
     "TileRegions",
     "ValuesInclude",
     "Version",
@@ -218,8 +220,6 @@ if not TYPE_CHECKING:
         "CoarseResponse": ".coarse_response",
         "CurvaturesRequest": ".curvatures_request",
         "CurvaturesResponse": ".curvatures_response",
-        "Flag": ".flags",
-        "FlagReason": ".flag_reason",
         "Diagnostics": ".diagnostics",
         "DuplicatePolicy": ".duplicate_policy",
         "EstimateRequest": ".estimate_request",
@@ -227,8 +227,9 @@ if not TYPE_CHECKING:
         "FactorizationUsed": ".factorization_used",
         "FamilyScore": ".family_score",
         "FieldError": ".field_error",
+        "Flag": ".flag",
+        "FlagReason": ".flag_reason",
         "FreeParameter": ".free_parameter",
-        "Geometry": ".geometry",
         "GeometryInclude": ".geometry_include",
         "Health": ".health",
         "Hyperparameters": ".hyperparameters",
@@ -272,6 +273,7 @@ if not TYPE_CHECKING:
         "PathEntry": ".path_entry",
         "PosteriorBatchRequest": ".posterior_batch_request",
         "PosteriorBatchResponse": ".posterior_batch_response",
+        "PosteriorOf": ".posterior_of",
         "PosteriorQuantity": ".posterior_quantity",
         "PosteriorRequest": ".posterior_request",
         "PosteriorResponse": ".posterior_response",
@@ -289,14 +291,15 @@ if not TYPE_CHECKING:
         "SolverUsed": ".solver_used",
         "Spacing": ".spacing",
         "StencilsUsed": ".stencils_used",
-        "SurfaceChoice": ".surface_choice",
+        "Surface": ".surface",
         "SurfaceGradientMatrixRequest": ".surface_gradient_matrix_request",
         "SurfaceGradientMatrixResponse": ".surface_gradient_matrix_response",
         "SurfaceGradientRequest": ".surface_gradient_request",
         "SurfaceGradientResponse": ".surface_gradient_response",
         "SurfaceGradientSparseMatrixRequest": ".surface_gradient_sparse_matrix_request",
         "SurfaceGradientSparseMatrixResponse": ".surface_gradient_sparse_matrix_response",
-        "SurfaceUsed": ".surface_used",
+        "SurfaceModelChoice": ".surface_model_choice",
+        "SurfaceModelUsed": ".surface_model_used",
         "TileRegions": ".tile_regions",
         "ValuesInclude": ".values_include",
         "Version": ".version",

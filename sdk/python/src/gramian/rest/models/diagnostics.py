@@ -43,9 +43,10 @@ class Diagnostics:
         remaining_diagonal (float | Unset): Largest entry of the diagonal of K that the landmarks leave, over all
             points. Only with the solver
             `landmark`.
-        tolerance (float | Unset): With the solver `landmark`, what was to be left of the diagonal at most: a millionth
-            of the noise or
-            less. With `iterative`, the largest relative residual that was allowed.
+        diagonal_tolerance (float | Unset): Largest entry of the diagonal that the landmarks were allowed to leave, unit
+            of the values squared: a
+            millionth of the noise or less. Only with the solver `landmark`.
+        tolerance (float | Unset): Largest relative residual that was allowed. Only with the solver `iterative`.
         iterations (int | Unset): Number of iterations of conjugate gradients, with the solvers `iterative` and
             `landmark`.
         reciprocal_condition (float | Unset): Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): roughly the fraction of digits
@@ -69,7 +70,7 @@ class Diagnostics:
         reach (int | Unset): Number of positions around a point on which the answer there depends, with local
             regressions.
         stencils (StencilsUsed | Unset): Number of rows of a sparse operator by how their weights were computed.
-        geometry (Diagnostics | Unset): Diagnostics of an answer: the numbers used, the method, and its accuracy.
+        surface (Diagnostics | Unset): Diagnostics of an answer: the numbers used, the method, and its accuracy.
     """
 
     cloud_id: str
@@ -85,6 +86,7 @@ class Diagnostics:
     solver_reason: str | Unset = UNSET
     rank: int | Unset = UNSET
     remaining_diagonal: float | Unset = UNSET
+    diagonal_tolerance: float | Unset = UNSET
     tolerance: float | Unset = UNSET
     iterations: int | Unset = UNSET
     reciprocal_condition: float | Unset = UNSET
@@ -96,7 +98,7 @@ class Diagnostics:
     hyperparameters: Hyperparameters | Unset = UNSET
     reach: int | Unset = UNSET
     stencils: StencilsUsed | Unset = UNSET
-    geometry: Diagnostics | Unset = UNSET
+    surface: Diagnostics | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
     __repr__ = without_unset
@@ -131,6 +133,8 @@ class Diagnostics:
 
         remaining_diagonal = self.remaining_diagonal
 
+        diagonal_tolerance = self.diagonal_tolerance
+
         tolerance = self.tolerance
 
         iterations = self.iterations
@@ -159,9 +163,9 @@ class Diagnostics:
         if not isinstance(self.stencils, Unset):
             stencils = self.stencils.to_dict()
 
-        geometry: dict[str, Any] | Unset = UNSET
-        if not isinstance(self.geometry, Unset):
-            geometry = self.geometry.to_dict()
+        surface: dict[str, Any] | Unset = UNSET
+        if not isinstance(self.surface, Unset):
+            surface = self.surface.to_dict()
 
         field_dict: dict[str, Any] = {}
         field_dict.update(self.additional_properties)
@@ -186,6 +190,8 @@ class Diagnostics:
             field_dict["rank"] = rank
         if remaining_diagonal is not UNSET:
             field_dict["remaining_diagonal"] = remaining_diagonal
+        if diagonal_tolerance is not UNSET:
+            field_dict["diagonal_tolerance"] = diagonal_tolerance
         if tolerance is not UNSET:
             field_dict["tolerance"] = tolerance
         if iterations is not UNSET:
@@ -208,8 +214,8 @@ class Diagnostics:
             field_dict["reach"] = reach
         if stencils is not UNSET:
             field_dict["stencils"] = stencils
-        if geometry is not UNSET:
-            field_dict["geometry"] = geometry
+        if surface is not UNSET:
+            field_dict["surface"] = surface
 
         return field_dict
 
@@ -252,6 +258,8 @@ class Diagnostics:
 
         remaining_diagonal = d.pop("remaining_diagonal", UNSET)
 
+        diagonal_tolerance = d.pop("diagonal_tolerance", UNSET)
+
         tolerance = d.pop("tolerance", UNSET)
 
         iterations = d.pop("iterations", UNSET)
@@ -284,12 +292,12 @@ class Diagnostics:
         else:
             stencils = StencilsUsed.from_dict(_stencils)
 
-        _geometry = d.pop("geometry", UNSET)
-        geometry: Diagnostics | Unset
-        if isinstance(_geometry, Unset):
-            geometry = UNSET
+        _surface = d.pop("surface", UNSET)
+        surface: Diagnostics | Unset
+        if isinstance(_surface, Unset):
+            surface = UNSET
         else:
-            geometry = Diagnostics.from_dict(_geometry)
+            surface = Diagnostics.from_dict(_surface)
 
         diagnostics = cls(
             cloud_id=cloud_id,
@@ -305,6 +313,7 @@ class Diagnostics:
             solver_reason=solver_reason,
             rank=rank,
             remaining_diagonal=remaining_diagonal,
+            diagonal_tolerance=diagonal_tolerance,
             tolerance=tolerance,
             iterations=iterations,
             reciprocal_condition=reciprocal_condition,
@@ -316,7 +325,7 @@ class Diagnostics:
             hyperparameters=hyperparameters,
             reach=reach,
             stencils=stencils,
-            geometry=geometry,
+            surface=surface,
         )
 
         diagnostics.additional_properties = d

@@ -2,8 +2,8 @@ from enum import StrEnum
 
 
 class GeometryInclude(StrEnum):
-    DEVIATIONS = "std"
     EDGE_NORMALS = "edge_normals"
+    STD = "std"
 
     def __str__(self) -> str:
         return str(self.value)

@@ -3,7 +3,7 @@ from enum import StrEnum
 
 class MeshInclude(StrEnum):
     CURVATURES = "curvatures"
-    DEVIATIONS = "std"
+    STD = "std"
 
     def __str__(self) -> str:
         return str(self.value)

@@ -6,8 +6,8 @@ class PosteriorQuantity(StrEnum):
     GRADIENTS = "gradients"
     GRADIENT_VARIANCES = "gradient_variances"
     LOG_MARGINAL_LIKELIHOOD = "log_marginal_likelihood"
-    OBSERVATION_VARIANCE = "observation_variance"
-    VARIANCE = "variance"
+    OBSERVATION_VARIANCES = "observation_variances"
+    VARIANCES = "variances"
 
     def __str__(self) -> str:
         return str(self.value)

@@ -2,7 +2,7 @@ from enum import StrEnum
 
 
 class ValuesInclude(StrEnum):
-    DEVIATIONS = "std"
+    STD = "std"
 
     def __str__(self) -> str:
         return str(self.value)

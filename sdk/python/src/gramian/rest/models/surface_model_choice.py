@@ -1,10 +1,10 @@
 from enum import StrEnum
 
 
-class SurfaceChoice(StrEnum):
+class SurfaceModelChoice(StrEnum):
     AUTO = "auto"
-    LOCAL = "local"
     OFFSET = "offset"
+    REGRESSION = "regression"
     SIGNATURE = "signature"
 
     def __str__(self) -> str:

@@ -18,7 +18,7 @@ class Flag:
 
     Attributes:
         query (int): The position of the query.
-        reason (FlagReason): The reason why a query is flags.
+        reason (FlagReason): The reason why a query has a flag.
         gradient_norm (float): |∇| of the function used at the query.
 
             Its unit is 1/length for the signature function. It is about 1 for the offset model, and 0 where that
@@ -60,14 +60,14 @@ class Flag:
 
         gradient_norm = d.pop("gradient_norm")
 
-        flags = cls(
+        flag = cls(
             query=query,
             reason=reason,
             gradient_norm=gradient_norm,
         )
 
-        flags.additional_properties = d
-        return flags
+        flag.additional_properties = d
+        return flag
 
     @property
     def additional_keys(self) -> list[str]:

@@ -1,9 +1,9 @@
 from enum import StrEnum
 
 
-class SurfaceUsed(StrEnum):
-    LOCAL = "local"
+class SurfaceModelUsed(StrEnum):
     OFFSET = "offset"
+    REGRESSION = "regression"
     SIGNATURE = "signature"
 
     def __str__(self) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 from attrs import define as _attrs_define
 
 from ..models.solver_choice import SolverChoice
-from ..models.surface_choice import SurfaceChoice
+from ..models.surface_model_choice import SurfaceModelChoice
 from ..types import UNSET, Unset, without_unset
 
 if TYPE_CHECKING:
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from ..models.kernel import Kernel
 
 
-T = TypeVar("T", bound="Geometry")
+T = TypeVar("T", bound="Surface")
 
 
 @_attrs_define
-class Geometry:
+class Surface:
     """The surface of an operator, if it differs from the surface of the request.
 
     It may come from another cloud, kernel or alpha than the values. Absent fields are taken from the request.
@@ -36,7 +36,7 @@ class Geometry:
                 of `alpha`. An empty list
                 counts as absent.
             solver (SolverChoice | Unset): The method that solves the linear system.
-            surface (SurfaceChoice | Unset): The function whose level set is the surface.
+            model (SurfaceModelChoice | Unset): The function whose level set is the surface.
     """
 
     cloud: CloudRef | Unset = UNSET
@@ -44,7 +44,7 @@ class Geometry:
     alpha: float | Unset = UNSET
     noise_variances: list[float] | Unset = UNSET
     solver: SolverChoice | Unset = UNSET
-    surface: SurfaceChoice | Unset = UNSET
+    model: SurfaceModelChoice | Unset = UNSET
 
     __repr__ = without_unset
 
@@ -67,9 +67,9 @@ class Geometry:
         if not isinstance(self.solver, Unset):
             solver = self.solver.value
 
-        surface: str | Unset = UNSET
-        if not isinstance(self.surface, Unset):
-            surface = self.surface.value
+        model: str | Unset = UNSET
+        if not isinstance(self.model, Unset):
+            model = self.model.value
 
         field_dict: dict[str, Any] = {}
 
@@ -84,8 +84,8 @@ class Geometry:
             field_dict["noise_variances"] = noise_variances
         if solver is not UNSET:
             field_dict["solver"] = solver
-        if surface is not UNSET:
-            field_dict["surface"] = surface
+        if model is not UNSET:
+            field_dict["model"] = model
 
         return field_dict
 
@@ -120,20 +120,20 @@ class Geometry:
         else:
             solver = SolverChoice(_solver)
 
-        _surface = d.pop("surface", UNSET)
-        surface: SurfaceChoice | Unset
-        if isinstance(_surface, Unset):
-            surface = UNSET
+        _model = d.pop("model", UNSET)
+        model: SurfaceModelChoice | Unset
+        if isinstance(_model, Unset):
+            model = UNSET
         else:
-            surface = SurfaceChoice(_surface)
+            model = SurfaceModelChoice(_model)
 
-        geometry = cls(
+        surface = cls(
             cloud=cloud,
             kernel=kernel,
             alpha=alpha,
             noise_variances=noise_variances,
             solver=solver,
-            surface=surface,
+            model=model,
         )
 
-        return geometry
+        return surface
