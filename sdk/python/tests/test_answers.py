@@ -16,7 +16,7 @@ import pytest
 from sent import CIRCLE, METHODS, OPERATORS, QUERYING, VALUES
 
 import gramian
-from gramian import Surface, Kernel
+from gramian import Kernel, Surface
 from gramian.answers import Answer
 from gramian.answers.files import replace_file
 from gramian.answers.fit import operator_fit_used, surface_fit_used
@@ -129,7 +129,12 @@ def test_so_it_does_where_nothing_but_neighbours_is_fitted(method: str) -> None:
             {"solver": "local"},
             {"solver": "local", "surface": {"solver": "dense", "kernel": "gauss", "alpha": 1e-8}},
         ]
-        said += [{"solver": "local", "surface": {"cloud": gramian.Client().cloud(1.01 * MANY), "surface_model": "regression"}}]
+        said += [
+            {
+                "solver": "local",
+                "surface": {"cloud": gramian.Client().cloud(1.01 * MANY), "surface_model": "regression"},
+            }
+        ]
     given = {"values": MANY[:, 0]} if "values" in METHODS[method] else {}
     for arguments in said:
         answer = getattr(cloud, method)(**given, queries=MANY[:3], **arguments)

@@ -18,7 +18,7 @@ import pytest
 from sent import BATCHES, CIRCLE, LISTS, METHODS, OPERATORS, QUERYING, SURFACES, VALUES, client, cloud, posted, sent
 
 import gramian
-from gramian import Surface, Kernel, KernelFamily, SolverChoice, SolverUsed
+from gramian import Kernel, KernelFamily, SolverChoice, SolverUsed, Surface
 from gramian.rest import models
 from gramian.rest.types import UNSET
 
@@ -420,7 +420,7 @@ def test_normals_have_the_shape_of_the_points() -> None:
 SOLVERS = ["dense", np.str_("dense"), np.array("dense"), SolverChoice.DENSE, SolverUsed.DENSE]
 QUANTITIES = [
     "variances",
-    gramian.PosteriorQuantity.VARIANCE,
+    gramian.PosteriorQuantity.VARIANCES,
     np.array("variances"),
     ["variances"],
     ("variances",),
@@ -428,7 +428,7 @@ QUANTITIES = [
     {"variances": 1}.keys(),
     iter(["variances"]),
     np.array(["variances"]),
-    [gramian.PosteriorQuantity.VARIANCE],
+    [gramian.PosteriorQuantity.VARIANCES],
 ]
 
 
@@ -446,7 +446,7 @@ def test_words_may_be_strings_or_members_of_enumerations(method: str) -> None:
         assert sent(method, duplicates=merge)["duplicates"] == "merge"
     if method in ["normals", "curvatures"]:
         for surface in ["offset", gramian.SurfaceModelChoice.OFFSET, gramian.SurfaceModelUsed.OFFSET]:
-            assert sent(method, surface=surface)["surface_model"] == "offset"
+            assert sent(method, surface_model=surface)["surface_model"] == "offset"
         for orientation in ["gradient", gramian.OrientationChoice.GRADIENT]:
             assert sent(method, orientation=orientation)["orientation"] == "gradient"
 
@@ -460,7 +460,7 @@ def test_deviations_may_be_asked_for_by_their_own_name(method: str) -> None:
         {"std": True, "include": []},
         {"std": True, "include": "std"},
         {"include": "std"},
-        {"include": [gramian.GeometryInclude.DEVIATIONS], "std": False},
+        {"include": [gramian.GeometryInclude.STD], "std": False},
     ]
     for arguments in said:
         assert sent(method, **arguments) == sent(method) | wanted
@@ -829,7 +829,13 @@ def test_none_is_as_absent_everywhere(method: str, absent: object) -> None:
     names += ["hyperparameters"] if method in SURFACES else []
     assert sent(method, **dict.fromkeys(names, absent), alpha=None) == sent(method)
     if method in OPERATORS:
-        nothing = {"cloud": absent, "kernel": absent, "noise_variances": absent, "solver": absent, "surface_model": absent}
+        nothing = {
+            "cloud": absent,
+            "kernel": absent,
+            "noise_variances": absent,
+            "solver": absent,
+            "surface_model": absent,
+        }
         assert sent(method, surface=nothing)["surface"] == {}
 
 

@@ -117,9 +117,7 @@ def test_points_may_coincide_and_be_few(client: gramian.Client, service: gramian
     points = np.concatenate([points, points[:40]])
     tiles = service.tiles(points, n_tiles)
     (found,) = dask.compute(tiles.curvatures(std=True))
-    assert_same(
-        found, client.cloud(points).curvatures(solver="local", std=True, hyperparameters=tiles.hyperparameters)
-    )
+    assert_same(found, client.cloud(points).curvatures(solver="local", std=True, hyperparameters=tiles.hyperparameters))
 
 
 def test_tiles_without_a_surface_have_no_normals(service: gramian.dask.Service) -> None:

@@ -20,7 +20,7 @@ import pytest
 import scipy.sparse
 
 import gramian
-from gramian import Cloud, Surface, InterpolationBatch, Kernel, KernelFamily, PosteriorBatch
+from gramian import Cloud, InterpolationBatch, Kernel, KernelFamily, PosteriorBatch, Surface
 from gramian.answers import Answer
 from gramian.rest import models
 from gramian.rest.api.geometry import compute_normals
@@ -154,7 +154,7 @@ def test_answers_have_the_documented_shapes(client: gramian.Client) -> None:
     assert curvatures.principal_directions.shape == (7, 2, 3)
     assert curvatures.mean_curvatures.shape == curvatures.gaussian_curvatures.shape == (7,)
     assert curvatures.normals.shape == (7, 3)
-    assert len(curvatures.surfaces) == 7
+    assert len(curvatures.surface_models) == 7
     assert cloud.laplace_beltrami_matrix(queries).matrix.shape == (7, 50)
     assert cloud.surface_gradient_matrix(queries).matrices.shape == (3, 7, 50)
     answer = cloud.interpolate(np.ones(50), queries, derivatives=2)
@@ -182,8 +182,8 @@ def test_measured_values_need_no_parameters(client: gramian.Client) -> None:
     assert np.all(np.abs(answer.values - 20 - z[:40]) < 4 * answer.value_std)
     assert answer.fit["mean"] == "constant"
     laplacian = sphere.laplace_beltrami(values, std=True)
-    assert laplacian.value_std is not None
-    within = np.abs(laplacian.values + 2 * z) < 1.96 * laplacian.value_std
+    assert laplacian.laplacian_std is not None
+    within = np.abs(laplacian.laplacians + 2 * z) < 1.96 * laplacian.laplacian_std
     assert within.mean() > 0.88
     gradient = sphere.surface_gradient(values, include="std", mean="linear")
     assert gradient.gradient_std is not None
@@ -468,14 +468,14 @@ def test_the_cloud_of_a_geometry_is_posted_again(client: gramian.Client, circle:
     nodes, surface = client.cloud(circle), client.cloud(1.5 * circle)
     geometry = Surface(cloud=surface, kernel={"family": "gauss", "length_scale": 3.0}, alpha=0.0)
     expected = nodes.laplace_beltrami(squares(nodes), surface=geometry)
-    assert expected.values.shape == (8,)
+    assert expected.laplacians.shape == (8,)
     assert isinstance(expected.diagnostics.surface, gramian.Diagnostics)
     assert expected.diagnostics.surface.cloud_id == surface.id
     for forgotten in [[nodes], [surface], [nodes, surface]]:
         for cloud in forgotten:
             forget(cloud)
         answer = nodes.laplace_beltrami(squares(nodes), surface=geometry)
-        np.testing.assert_array_equal(answer.values, expected.values)
+        np.testing.assert_array_equal(answer.laplacians, expected.laplacians)
 
 
 def test_the_cloud_of_a_geometry_may_be_of_another_client(client: gramian.Client, circle: Array) -> None:

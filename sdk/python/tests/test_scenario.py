@@ -20,8 +20,8 @@ from gramian.rest.models import (
     CloudRequest,
     CurvaturesRequest,
     CurvaturesResponse,
-    FlagReason,
     FactorizationUsed,
+    FlagReason,
     Kernel,
     KernelFamily,
     LaplaceBeltramiMatrixRequest,
@@ -71,8 +71,8 @@ def test_curvatures_with_a_null_entry(client: Client, cloud: CloudRef) -> None:
     assert answer.principal_directions[1] is None
     assert answer.mean_curvatures[1] is None
 
-    assert answer.surfaces == [SurfaceModelUsed.SIGNATURE, SurfaceModelUsed.SIGNATURE]
-    assert isinstance(answer.surfaces[0], SurfaceModelUsed)
+    assert answer.surface_models == [SurfaceModelUsed.SIGNATURE, SurfaceModelUsed.SIGNATURE]
+    assert isinstance(answer.surface_models[0], SurfaceModelUsed)
     [flags] = answer.flags
     assert (flags.query, flags.reason) == (1, FlagReason.VANISHING_GRADIENT)
     assert isinstance(flags.reason, FlagReason)
@@ -101,7 +101,7 @@ def test_posterior_with_variance(client: Client, cloud: CloudRef) -> None:
         queries=[[0.9, 0.1]],
         kernel=GAUSS,
         alpha=1e-6,
-        include=[PosteriorQuantity.VARIANCE],
+        include=[PosteriorQuantity.VARIANCES],
     )
     answer = compute_posterior.sync(client=client, body=request)
     assert isinstance(answer, PosteriorResponse)

@@ -144,11 +144,12 @@ def test_a_required_body_is_required_and_the_key_is_not() -> None:
         fit.Family,
         fit.Solver,
         fit.Duplicates,
-        fit.Surface,
+        fit.SurfaceModel,
         fit.Orientation,
         fit.Mean,
         fit.Quantity,
         fit.Std,
+        fit.Of,
         fit.GeometryWord,
         selection.Criterion,
         selection.Parameter,
@@ -157,7 +158,7 @@ def test_a_required_body_is_required_and_the_key_is_not() -> None:
 )
 def test_plain_strings_are_those_of_the_enumeration(alias: types.UnionType) -> None:
     enumeration, *used, strings = get_args(alias)
-    assert used in ([], [models.SolverUsed])  # the solver that an answer reports can be sent back
+    assert used in ([], [models.SolverUsed], [models.SurfaceModelUsed])  # what an answer reports can be sent back
     assert typing.get_origin(strings) is Literal
     assert set(get_args(strings)) == {member.value for member in enumeration}
 

@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 
 from ..arguments.describe import described
-from ..rest.models import Flag, Diagnostics, FamilyScore, KernelUsed, MeshPart, SurfaceModelUsed
+from ..rest.models import Diagnostics, FamilyScore, Flag, KernelUsed, MeshPart, SurfaceModelUsed
 from ..wire.tensors import Array, Members
 from .html import page_of
 

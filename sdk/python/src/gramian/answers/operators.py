@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
 from ..arguments.options import OperatorFit, SurfaceOperatorFit
-from ..rest.models import Flag, Diagnostics
+from ..rest.models import Diagnostics, Flag
 from ..wire.tensors import Array, Members
 from .answer import Answer
 from .fit import operator_fit_used

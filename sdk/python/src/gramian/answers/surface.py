@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, Self
 
 from ..arguments.options import SurfaceFit
-from ..rest.models import Flag, Diagnostics, SurfaceModelUsed
+from ..rest.models import Diagnostics, Flag, SurfaceModelUsed
 from ..wire.tensors import Array, Members
 from .answer import Answer, numbers_of
 from .fit import surface_fit_used

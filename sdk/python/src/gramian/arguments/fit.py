@@ -49,9 +49,7 @@ Whole: TypeAlias = int | np.integer[Any] | npt.NDArray[np.integer[Any]]
 Family: TypeAlias = KernelFamily | Literal["gauss", "laplace", "matern", "wendland", "inverse_multiquadric"]
 Solver: TypeAlias = SolverChoice | SolverUsed | Literal["auto", "dense", "landmark", "iterative", "local"]
 Duplicates: TypeAlias = DuplicatePolicy | Literal["refuse", "merge"]
-SurfaceModel: TypeAlias = (
-    SurfaceModelChoice | SurfaceModelUsed | Literal["auto", "signature", "offset", "regression"]
-)
+SurfaceModel: TypeAlias = SurfaceModelChoice | SurfaceModelUsed | Literal["auto", "signature", "offset", "regression"]
 Std: TypeAlias = ValuesInclude | Literal["std"]
 GeometryWord: TypeAlias = GeometryInclude | Literal["std", "edge_normals"]
 MeshWord: TypeAlias = MeshInclude | Literal["curvatures", "std"]

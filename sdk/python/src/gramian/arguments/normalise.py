@@ -130,11 +130,11 @@ def words(*words: str) -> Rule:
 def with_std(fields: Mapping[str, object]) -> dict[str, object]:
     """Returns the fields with `"std"` in `include` instead of the argument `std`."""
     others = {name: value for name, value in fields.items() if name != "std"}
-    deviations, include = fields.get("std"), fields.get("include")
-    if _is_absent(deviations) or not as_truth("std", deviations):
+    std, include = fields.get("std"), fields.get("include")
+    if _is_absent(std) or not as_truth("std", std):
         return others
     wanted = [] if _is_absent(include) else as_words("include", include, MeshInclude)
-    return {**others, "include": list(dict.fromkeys([*wanted, MeshInclude.DEVIATIONS.value]))}
+    return {**others, "include": list(dict.fromkeys([*wanted, MeshInclude.STD.value]))}
 
 
 def samples(name: str, value: object, sizes: Sizes) -> dict[str, object]:

@@ -12,18 +12,18 @@ from typing import TYPE_CHECKING, Any, TypedDict
 import numpy.typing as npt
 
 from .fit import (
-    Of,
-    Std,
-    SurfaceModel,
     Fit,
-    SurfaceLike,
     GeometryWord,
     Mean,
     MeshWord,
     Number,
+    Of,
     Orientation,
     Quality,
     Quantity,
+    Std,
+    SurfaceLike,
+    SurfaceModel,
     ValuesFit,
     Whole,
 )

@@ -34,7 +34,7 @@ def surface(replicas: Replicas, tile: SurfaceTile, sides: Sides, whole: Whole, w
     def call(client: Client) -> Normals | Curvatures:
         cloud = client.cloud(tile.part.points, tile.directions)
         ask = cloud.normals if what == "normals" else cloud.curvatures
-        return ask(solver="local", std=deviations, hyperparameters=whole.hyperparameters)
+        return ask(solver="local", std=std, hyperparameters=whole.hyperparameters)
 
     answer = replicas.ask(tile.number, call)
     labels, (signs, are_doubtful) = tile.labels[tile.own], sides

@@ -60,11 +60,11 @@ class Tiles:
 
     def normals(self, *, std: bool = False) -> answers.Normals:
         """Computes unit normals at the points, outward as the coarse cloud has it, with `std` if asked for."""
-        return answers.named(answers.Normals, self._of_surface("normals", deviations))
+        return answers.named(answers.Normals, self._of_surface("normals", std))
 
     def curvatures(self, *, std: bool = False) -> answers.Curvatures:
         """Computes curvatures at the points, with `std` if asked for; a sphere of radius r has +1/r."""
-        return answers.named(answers.Curvatures, self._of_surface("curvatures", deviations))
+        return answers.named(answers.Curvatures, self._of_surface("curvatures", std))
 
     def laplace_beltrami(self) -> answers.SparseOperator:
         """Assembles the sparse Laplace–Beltrami operator on values at the points, 1/L²."""
@@ -99,7 +99,7 @@ class Tiles:
         asked = self._points if queries is None else rows_of(queries, "queries", self.plan.dimension)
         wanted = cores if queries is None else graph.cores(asked, self.plan)
         rims = graph.rims(cores, self.plan, law.reach, wanted)
-        kriging, krige = Kriging(law, derivatives, deviations), dask.delayed(Kriging.krige, pure=True)
+        kriging, krige = Kriging(law, derivatives, std), dask.delayed(Kriging.krige, pure=True)
         asks = [
             krige(kriging, self._replicas, cell, cores[cell], rims[cell], wanted[cell]) for cell in range(self.n_tiles)
         ]
@@ -109,7 +109,7 @@ class Tiles:
     def _of_surface(self, what: str, std: bool) -> dict[str, da.Array]:
         surface, ask = self._in_tiles(), dask.delayed(requests.surface, pure=True)
         pairs = zip(surface.tiles, surface.sides, strict=True)
-        rows = [ask(self._replicas, tile, sides, surface.whole, what, deviations) for tile, sides in pairs]
+        rows = [ask(self._replicas, tile, sides, surface.whole, what, std) for tile, sides in pairs]
         d = self.plan.dimension
         shapes: dict[str, tuple[int, ...]] = {"normals": (d,), "levels": ()}
         known: dict[str, tuple[int, ...]] = {"normal": ()}
@@ -117,7 +117,7 @@ class Tiles:
             known |= {"principal_curvature": (d - 1,), "mean_curvature": (), "gaussian_curvature": ()}
             shapes |= {f"{name}s": shape for name, shape in known.items()}
             shapes |= {"principal_directions": (d - 1, d), "normals": (d,)}
-        if deviations:
+        if std:
             shapes |= {f"{name}_std": shape for name, shape in known.items()}
         kinds = {name: np.empty((0, *shape)) for name, shape in shapes.items()}
         return graph.gathered(rows, self._points.chunks[0], {**kinds, "reasons": requests.NO_REASONS})

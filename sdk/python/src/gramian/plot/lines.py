@@ -22,18 +22,16 @@ class PosteriorDisplay:
         `[m]`. Where the queries are along the line.
     means
         `[m]`, V.
-    deviations
+    std
         `[m]`, V. Standard deviations.
     samples
         `[count, m]`, V. Joint draws.
     """
 
-    def __init__(
-        self, places: Array, means: Array, *, deviations: Array | None = None, samples: Array | None = None
-    ) -> None:
+    def __init__(self, places: Array, means: Array, *, std: Array | None = None, samples: Array | None = None) -> None:
         self.places = np.asarray(places, dtype=np.float64)
         self.means = means
-        self.std = deviations
+        self.std = std
         self.samples = samples
 
     @classmethod
@@ -52,8 +50,8 @@ class PosteriorDisplay:
             places = np.concatenate([[0.0], np.cumsum(steps)])
             if answer.positions.shape[1] == 1:
                 places = answer.positions[:, 0]
-        deviations = None if answer.variances is None else np.sqrt(answer.variances)
-        return cls(places, answer.means, std=deviations, samples=answer.samples)
+        std = None if answer.variances is None else np.sqrt(answer.variances)
+        return cls(places, answer.means, std=std, samples=answer.samples)
 
     def plot(self, ax: Any = None, *, colour: str = "C0") -> Self:  # noqa: ANN401 (Axes)
         """Draws mean, band and samples."""

@@ -28,7 +28,7 @@ class SurfaceDisplay:
         `[m, d]`, d = 2 or 3.
     values
         `[m]`. NaN where there is no answer: a ring marks these.
-    deviations
+    std
         `[m]`. Standard deviations of the values.
     normals
         `[m, d]`. With them, points are shaded.
@@ -43,14 +43,14 @@ class SurfaceDisplay:
         positions: Array,
         values: Array,
         *,
-        deviations: Array | None = None,
+        std: Array | None = None,
         normals: Array | None = None,
         name: str = "",
         is_signed: bool = False,
     ) -> None:
         self.positions = np.asarray(positions, dtype=np.float64)
         self.values = np.asarray(values, dtype=np.float64)
-        self.std = deviations
+        self.std = std
         self.normals = normals
         self.name = name
         self.is_signed = is_signed
@@ -82,7 +82,7 @@ class SurfaceDisplay:
         return cls(
             places,
             values,
-            std=deviations_of(answer, name),
+            std=std_of(answer, name),
             normals=answer.normals,
             name=name.replace("_", " "),
             is_signed=name.endswith("curvatures"),
@@ -156,7 +156,7 @@ class LevelSetDisplay:
         A `gramian.Mesh`. Its triangles are drawn from back to front.
     values
         `[k]`. A quantity at the vertices.
-    deviations
+    std
         `[k]`. Standard deviations of the values.
     name
         Title of the picture.
@@ -167,12 +167,12 @@ class LevelSetDisplay:
         mesh: Any,  # noqa: ANN401 (Mesh)
         values: Array,
         *,
-        deviations: Array | None = None,
+        std: Array | None = None,
         name: str = "",
     ) -> None:
         self.mesh = mesh
         self.values = values
-        self.std = deviations
+        self.std = std
         self.name = name
 
     @classmethod
@@ -184,7 +184,7 @@ class LevelSetDisplay:
             raise ValueError(f"the answer has no {name}")
         if values.ndim == 2:
             values = values[:, 0]
-        return cls(answer, values, std=deviations_of(answer, name), name=name.replace("_", " "))
+        return cls(answer, values, std=std_of(answer, name), name=name.replace("_", " "))
 
     def plot(
         self,
@@ -219,7 +219,7 @@ def default_quantity(answer: object) -> str:
     return next(name for name in QUANTITIES if getattr(answer, name, None) is not None)
 
 
-def deviations_of(answer: object, quantity: str) -> Array | None:
+def std_of(answer: object, quantity: str) -> Array | None:
     """Returns the standard deviations of a quantity, if the answer has them."""
     found: Array | None = getattr(answer, f"{quantity.removesuffix('s')}_std", None)
     return found if found is None or found.ndim == 1 else found[:, 0]
