@@ -18,6 +18,20 @@ fn curvature_calibration(bend: f64) -> f64 {
     0.80 + 0.95 * (bend.min(1.2) - 0.6).max(0.0)
 }
 
+/// Factor on the deviations of second derivatives under a model, by its ratio of the noise to the process.
+///
+/// Where nearly all is noise, the posterior is that of a quadric, and nothing is left out by the process. Where
+/// both are of one size, the process expects more bends than surfaces have (docs/error-bars.md).
+fn bend_calibration(noise: f64) -> f64 {
+    match noise {
+        ..0.003 => 1.0,
+        ..0.03 => 0.95,
+        ..0.3 => 0.85,
+        ..3.0 => 1.0,
+        _ => 1.1,
+    }
+}
+
 /// Expectation of |x| divided by its deviation, for a normal x of mean 0.
 const MEAN_MAGNITUDE: f64 = 0.8;
 
@@ -50,27 +64,26 @@ impl Estimate {
     pub(crate) fn of(models: &[Weighted], kriged: &[Kriged], dimension: usize) -> Option<Self> {
         let p = n_terms(dimension);
         let shares = responsibilities(models, kriged);
-        let used = || shares.iter().zip(kriged).filter(|(share, _)| **share > 0.0);
         let mut means = Terms::from_elem(0.0, p);
-        for (share, kriged) in used() {
+        for (share, kriged) in shares.iter().zip(kriged).filter(|(share, _)| **share > 0.0) {
             means.iter_mut().zip(&kriged.means).for_each(|(mean, m)| *mean += share * m);
         }
         let mut covariance = Squares::from_elem(0.0, p * p);
-        for (share, kriged) in used() {
-            // Student's t distribution is wider than the normal one, because the scale is estimated.
-            let widening = kriged.freedom / (kriged.freedom - 2.0).max(1.0);
-            for i in 0..p {
-                for j in 0..p {
-                    let between = (kriged.means[i] - means[i]) * (kriged.means[j] - means[j]);
-                    covariance[i * p + j] += share * (widening * kriged.covariance[i * p + j] + between);
-                }
-            }
-        }
         let (mut noise, mut third) = (0.0, 0.0);
         for ((share, kriged), weighted) in
             shares.iter().zip(kriged).zip(models).filter(|((s, _), _)| **s > 0.0)
         {
             let model = &weighted.model;
+            // Student's t distribution is wider than the normal one, because the scale is estimated.
+            let widening = kriged.freedom / (kriged.freedom - 2.0).max(1.0);
+            let of_bends = widening * bend_calibration(model.noise).powi(2);
+            for i in 0..p {
+                for j in 0..p {
+                    let factor = if i.min(j) >= dimension { of_bends } else { widening };
+                    let between = (kriged.means[i] - means[i]) * (kriged.means[j] - means[j]);
+                    covariance[i * p + j] += share * (factor * kriged.covariance[i * p + j] + between);
+                }
+            }
             noise += share * kriged.scale * model.noise;
             third += share * kriged.scale * model.third_derivative_variance();
         }

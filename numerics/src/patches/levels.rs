@@ -23,6 +23,10 @@ pub const N_BIASES: usize = 9;
 /// Ratios of the variance of the bias to that of the difference without it.
 const EXCESSES: [f64; N_BIASES] = [0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 1000.0];
 
+/// Least ratio that is a bias. Smaller ones are variances that are somewhat off: a few tenths of V may be many
+/// times the variance of the coarser level, and would make the bars of smooth surfaces longer.
+const LEAST_BIAS: f64 = 1.0;
+
 /// Share of the places below which a ratio is left out: what single places have may as well be a fine level
 /// that is off by more than it says.
 const LEAST_SHARE: f64 = 0.01;
@@ -104,7 +108,8 @@ impl Discrepancy {
             self.log_likelihoods().iter().zip(shares).map(|(log, share)| log + share.ln()).collect();
         let posterior = normalized(&logs);
         let moment = |power: i32| -> f64 {
-            posterior.iter().zip(EXCESSES).map(|(p, ratio)| p * (ratio / (1.0 + ratio)).powi(power)).sum()
+            let biased = posterior.iter().zip(EXCESSES).filter(|(_, ratio)| *ratio >= LEAST_BIAS);
+            biased.map(|(p, ratio)| p * (ratio / (1.0 + ratio)).powi(power)).sum()
         };
         let mean = moment(1);
         Weight { mean, variance: (moment(2) - mean * mean).max(0.0) }

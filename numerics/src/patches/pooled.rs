@@ -31,8 +31,9 @@ const STIFF: f64 = 4.0;
 const ROUGH_ORDER: u8 = 2;
 const ROUGH_LENGTH_SCALE: f64 = 3.0;
 
-/// Candidate ratios for this process. With more noise, nothing tells it from the smoother one.
-const ROUGH_NOISES: [f64; 5] = [0.0, 1e-8, 1e-6, 1e-4, 1e-3];
+/// Candidate ratios for this process. With more noise, nothing tells it from the smoother one: it would take a
+/// third of the neighbourhoods of smooth surfaces, and make bars longer there (docs/error-bars.md).
+const ROUGH_NOISES: [f64; 4] = [0.0, 1e-8, 1e-6, 1e-4];
 
 /// Candidate ratios of the variance of the noise to that of the process.
 const NOISES: [f64; 12] = [0.0, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0];
