@@ -1,6 +1,7 @@
 //! The error type of the numerical layer, with its messages.
 
 use gramian_observer::Cancelled;
+use strum::{IntoStaticStr, VariantArray};
 
 /// The result of a computation that may be refused.
 pub type Result<T, E = NumericsError> = std::result::Result<T, E>;
@@ -122,8 +123,9 @@ pub enum NotDefinite {
     NegativeVariance { query: usize, variance: f64 },
 }
 
-/// A solver of the kernel system.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// A solver of the kernel system. Its name is the variant in lower case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "snake_case")]
 pub enum SolverKind {
     /// A factorization of the whole matrix.
     Dense,

@@ -62,3 +62,4 @@ mod tls;
 mod units_differ;
 mod unsolvable;
 mod values;
+mod words;

@@ -2,7 +2,7 @@
 //! and every verb that it serves (after tinygp's "consistent with direct"). Every verb that it does
 //! not serve must be refused.
 //!
-//! [`solvers`] lists them, one line each. The dense solver is compared with itself on the same points in
+//! The dense solver is compared with itself on the same points in
 //! another order, so that no two numbers come from the same operations.
 //!
 //! The local solver is not listed, because it has no single function to evaluate here. On a cloud of its
@@ -18,17 +18,18 @@ use std::sync::Arc;
 
 use common::clouds::{fibonacci_sphere, wave};
 use common::kernels::all_families;
-use gramian_numerics::error::NumericsError;
+use gramian_numerics::error::{NumericsError, SolverKind};
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::regression::solver::{Solver, System};
 use gramian_numerics::regression::sums::regularization::Regularization;
+use strum::VariantArray;
 use verbs::{Setting, VERBS};
 
 /// A solver, the difference from the dense answers allowed beyond rounding, and the verbs that it refuses.
 struct Candidate {
-    name: &'static str,
+    kind: SolverKind,
     make: fn(System) -> Result<Solver, NumericsError>,
     tolerance: f64,
     refuses: &'static [&'static str],
@@ -38,17 +39,23 @@ struct Candidate {
 const NO_WEIGHTS: [&str; 3] =
     ["surface gradient as matrices", "Laplace–Beltrami operator as matrix", "log marginal likelihood"];
 
+/// Every solver with one function through all points, the dense one first.
 fn solvers() -> Vec<Candidate> {
-    let dense = |system| Solver::dense(system, &Unobserved);
-    let landmark = |system| Solver::landmark(system, &Unobserved);
-    let iterative = |system| Solver::iterative_to(1e-12, system, &Unobserved);
-    vec![
-        Candidate { name: "dense", make: dense, tolerance: 0.0, refuses: &[] },
+    SolverKind::VARIANTS.iter().filter_map(|&kind| candidate(kind)).collect()
+}
+
+fn candidate(kind: SolverKind) -> Option<Candidate> {
+    let of = |make, tolerance, refuses| Some(Candidate { kind, make, tolerance, refuses });
+    match kind {
+        SolverKind::Dense => of(|system| Solver::dense(system, &Unobserved), 0.0, &[]),
         // A millionth of the noise may remain of the diagonal.
-        Candidate { name: "landmark", make: landmark, tolerance: 1e-6, refuses: &[] },
+        SolverKind::Landmark => of(|system| Solver::landmark(system, &Unobserved), 1e-6, &[]),
         // The residual is 1e-12, and the matrices of smooth kernels have conditions to match.
-        Candidate { name: "iterative", make: iterative, tolerance: 1e-6, refuses: &NO_WEIGHTS },
-    ]
+        SolverKind::Iterative => {
+            of(|system| Solver::iterative_to(1e-12, system, &Unobserved), 1e-6, &NO_WEIGHTS)
+        }
+        SolverKind::Local => None,
+    }
 }
 
 const N_POINTS: usize = 150;
@@ -73,7 +80,7 @@ fn every_solver_answers_as_the_dense_one() {
             let solver = Arc::new((candidate.make)(system(&other, family)).unwrap());
             let setting = Setting { solver, values: other.points().map(wave).collect() };
             for verb in VERBS {
-                let context = format!("{} of {}, {family:?}", verb.name, candidate.name);
+                let context = format!("{} of {:?}, {family:?}", verb.name, candidate.kind);
                 let (expected, found) = ((verb.ask)(&dense), (verb.ask)(&setting));
                 if candidate.refuses.contains(&verb.name) {
                     assert!(matches!(found, Err(NumericsError::Unsupported { .. })), "{context}");

@@ -12,8 +12,6 @@ use gramian_numerics::operators::{RowKind, Stencils};
 use gramian_numerics::regression::solver::{Autocorrelation, Disagreement, Outlier, Place};
 
 /// The factorization of the Gram matrix.
-///
-/// `bunch_kaufman`, `partial_pivoting_lu` and `conjugate_gradients` are reserved: no answer has them yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FactorizationUsed {
@@ -21,10 +19,6 @@ pub enum FactorizationUsed {
     Cholesky,
     /// Rank-revealing pivoted Cholesky and least squares on its pivots, used where Cholesky fails in float64.
     PivotedCholesky,
-    /// Reserved for a symmetric indefinite factorization.
-    BunchKaufman,
-    /// Reserved for LU with partial pivoting.
-    PartialPivotingLu,
     /// Cholesky of the normal equations of landmarks.
     Landmark,
     /// Conjugate gradients, preconditioned by a sparse factor of the inverse.

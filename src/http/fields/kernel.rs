@@ -1,6 +1,7 @@
 //! Kernels in JSON, and their conversion to and from kernels of the numerics.
 
 use serde::{Deserialize, Serialize};
+use strum::VariantArray;
 use utoipa::ToSchema;
 
 use super::schemas::Smoothness;
@@ -13,7 +14,7 @@ use gramian_numerics::patches::PatchKernel;
 use gramian_numerics::points::sampling::Scales;
 
 /// The families of kernels. `GET /v1/kernels` has their formulas.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, VariantArray)]
 #[serde(rename_all = "snake_case")]
 pub enum KernelFamily {
     Gauss,

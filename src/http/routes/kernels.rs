@@ -1,6 +1,7 @@
 //! `GET /v1/kernels`: the kernel families, as a list for clients.
 
 use serde::Serialize;
+use strum::VariantArray;
 use utoipa::ToSchema;
 
 use crate::http::fields::KernelFamily;
@@ -44,7 +45,7 @@ pub struct KernelDescription {
 /// All kernel families.
 #[derive(Serialize, ToSchema)]
 pub struct KernelList {
-    /// The families, in the order in which the documentation names them.
+    /// All families.
     kernels: Vec<KernelDescription>,
 }
 
@@ -58,48 +59,53 @@ pub struct KernelList {
     responses((status = 200, description = "All families", body = KernelList), ReadProblems)
 )]
 pub async fn list_kernels() -> Json<KernelList> {
-    let always = "always";
-    let kernels = vec![
-        KernelDescription {
-            family: KernelFamily::Gauss,
-            formula: "exp(-r^2)",
-            smoothness: "analytic",
-            parameters: vec![],
-            max_dimension: None,
-            differentiable_at_points: always,
-        },
-        KernelDescription {
-            family: KernelFamily::Laplace,
-            formula: "exp(-sqrt(r^2 + epsilon)), with phi(0) = exp(-sqrt(epsilon))",
-            smoothness: "analytic if epsilon > 0, continuous with a kink if epsilon = 0",
-            parameters: vec![KernelParameter { name: "epsilon", default: 0.0, range: "0 to 1e5" }],
-            max_dimension: None,
-            differentiable_at_points: "if epsilon > 0",
-        },
-        KernelDescription {
-            family: KernelFamily::Matern,
-            formula: "exp(-s) theta_p(s)/theta_p(0), s = sqrt(2 nu) r, nu = p + 1/2, theta_p the reverse Bessel polynomial",
-            smoothness: "2p times continuously differentiable, p = nu - 1/2",
-            parameters: vec![KernelParameter { name: "nu", default: 2.5, range: "0.5, 1.5, ..., 8.5" }],
-            max_dimension: None,
-            differentiable_at_points: "if nu >= 1.5",
-        },
-        KernelDescription {
-            family: KernelFamily::Wendland,
-            formula: "for r < 1, else 0: (1-r)^4 (4r+1); (1-r)^6 (35r^2+18r+3)/3; (1-r)^8 (32r^3+25r^2+8r+1)",
-            smoothness: "2, 4 or 6 times continuously differentiable, as the parameter smoothness says",
-            parameters: vec![KernelParameter { name: "smoothness", default: 4.0, range: "2, 4, 6" }],
-            max_dimension: Family::Wendland { smoothness: WendlandSmoothness::C4 }.max_dimension(),
-            differentiable_at_points: always,
-        },
-        KernelDescription {
-            family: KernelFamily::InverseMultiquadric,
-            formula: "(1 + r^2)^(-1/2)",
-            smoothness: "analytic",
-            parameters: vec![],
-            max_dimension: None,
-            differentiable_at_points: always,
-        },
-    ];
-    Json(KernelList { kernels })
+    Json(KernelList { kernels: KernelFamily::VARIANTS.iter().copied().map(KernelDescription::of).collect() })
+}
+
+impl KernelDescription {
+    fn of(family: KernelFamily) -> Self {
+        let always = "always";
+        match family {
+            KernelFamily::Gauss => Self {
+                family,
+                formula: "exp(-r^2)",
+                smoothness: "analytic",
+                parameters: vec![],
+                max_dimension: None,
+                differentiable_at_points: always,
+            },
+            KernelFamily::Laplace => Self {
+                family,
+                formula: "exp(-sqrt(r^2 + epsilon)), with phi(0) = exp(-sqrt(epsilon))",
+                smoothness: "analytic if epsilon > 0, continuous with a kink if epsilon = 0",
+                parameters: vec![KernelParameter { name: "epsilon", default: 0.0, range: "0 to 1e5" }],
+                max_dimension: None,
+                differentiable_at_points: "if epsilon > 0",
+            },
+            KernelFamily::Matern => Self {
+                family,
+                formula: "exp(-s) theta_p(s)/theta_p(0), s = sqrt(2 nu) r, nu = p + 1/2, theta_p the reverse Bessel polynomial",
+                smoothness: "2p times continuously differentiable, p = nu - 1/2",
+                parameters: vec![KernelParameter { name: "nu", default: 2.5, range: "0.5, 1.5, ..., 8.5" }],
+                max_dimension: None,
+                differentiable_at_points: "if nu >= 1.5",
+            },
+            KernelFamily::Wendland => Self {
+                family,
+                formula: "for r < 1, else 0: (1-r)^4 (4r+1); (1-r)^6 (35r^2+18r+3)/3; (1-r)^8 (32r^3+25r^2+8r+1)",
+                smoothness: "2, 4 or 6 times continuously differentiable, as the parameter smoothness says",
+                parameters: vec![KernelParameter { name: "smoothness", default: 4.0, range: "2, 4, 6" }],
+                max_dimension: Family::Wendland { smoothness: WendlandSmoothness::C4 }.max_dimension(),
+                differentiable_at_points: always,
+            },
+            KernelFamily::InverseMultiquadric => Self {
+                family,
+                formula: "(1 + r^2)^(-1/2)",
+                smoothness: "analytic",
+                parameters: vec![],
+                max_dimension: None,
+                differentiable_at_points: always,
+            },
+        }
+    }
 }

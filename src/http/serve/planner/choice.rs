@@ -34,8 +34,10 @@ impl Restricted {
         Problem::of_field(catalogue::UNSUPPORTED_BY_SOLVER, self.pointer, detail)
     }
 
-    pub(super) fn remedy(self) -> String {
-        format!("leave out {}, which the local solver cannot compute, or thin the cloud", self.name)
+    /// What to do where `auto` would take this solver.
+    pub(super) fn remedy(self, solver: SolverKind) -> String {
+        let solver: &str = solver.into();
+        format!("leave out {}, which the {solver} solver cannot compute, or thin the cloud", self.name)
     }
 }
 

@@ -86,7 +86,7 @@ impl<'a> Planner<'a> {
         if let Some(asked) = restricted.filter(|asked| asked.without.contains(&solver.kind)) {
             return Err(match solver.reason {
                 None => asked.refused_by(solver.kind),
-                Some(_) => self.beyond_dense(&on).with_remedy(&asked.remedy()),
+                Some(_) => self.beyond_dense(&on).with_remedy(&asked.remedy(solver.kind)),
             });
         }
         self.plan_given_values(on, FitOptions::of(fit), solver, given)
