@@ -16,7 +16,7 @@ from sklearn.base import clone
 from sklearn.decomposition import PCA
 from sklearn.exceptions import NotFittedError
 from sklearn.gaussian_process import GaussianProcessRegressor
-from sklearn.gaussian_process.kernels import RBF, WhiteKernel
+from sklearn.gaussian_process.kernels import RBF, ConstantKernel, DotProduct, Matern, WhiteKernel
 from sklearn.model_selection import GridSearchCV, cross_val_score
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
@@ -56,6 +56,18 @@ def truth(points: Array) -> Array:
 
 X, Y = field(200, seed=0)
 QUERIES = field(20, seed=1)[0]
+
+#: Kernels of scikit-learn that are converted.
+OF_SKLEARN = {
+    "RBF": RBF(0.3),
+    "length scales": RBF([0.3, 0.7]),
+    "Matern": Matern(0.4, nu=1.5),
+    "Matern with a length scale for each": Matern([0.4, 0.6], nu=2.5),
+    "Matern, smooth": Matern(0.3, nu=np.inf),
+    "with a factor": ConstantKernel(2.5) * RBF(0.3),
+    "with noise": 1.5 * Matern(0.4, nu=0.5) + WhiteKernel(0.01),
+    "with noise twice": WhiteKernel(0.01) + 2.0 * RBF(0.3) + 0.5 * WhiteKernel(0.02),
+}
 
 
 @parametrize_with_checks(ESTIMATORS)  # type: ignore[untyped-decorator]
@@ -199,7 +211,7 @@ def test_other_refusals_say_what_is_wrong() -> None:
     with pytest.raises(ValueError, match=r"^alpha is to be .* each of the 200 samples, not of the shape \(3,\)$"):
         KernelRegressor(alpha=[1, 2, 3]).fit(X, Y)
     with pytest.raises(ValueError, match="did you mean 'gauss'"):
-        KernelRegressor("gaus").fit(X, Y)  # type: ignore[arg-type]
+        KernelRegressor("gaus").fit(X, Y)
     with pytest.raises(gramian.Problem, match="the local solver treats each query separately, so it has no covariance"):
         KernelRegressor(solver="local").fit(X, Y).predict(QUERIES, return_cov=True)
 
@@ -226,3 +238,30 @@ except ImportError as error:
     printed = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True).stdout
     assert printed == "sklearn gramian.sklearn needs scikit-learn, 1.6 or later: pip install 'gramian[sklearn]'\n"
     assert sklearn.__name__ == "sklearn"  # not gramian's own module of that name
+
+
+@pytest.mark.parametrize("kernel", OF_SKLEARN.values(), ids=OF_SKLEARN.keys())
+@pytest.mark.parametrize("alpha", [1e-3, np.linspace(0.01, 0.03, 200)], ids=["alpha", "alpha of each"])
+def test_kernels_of_scikit_learn_mean_the_same(kernel: Any, alpha: Any) -> None:
+    theirs = GaussianProcessRegressor(kernel, alpha=alpha, optimizer=None).fit(X, Y)
+    ours = KernelRegressor(kernel, alpha=alpha).fit(X, Y)
+    np.testing.assert_allclose(ours.predict(QUERIES), theirs.predict(QUERIES), rtol=1e-7, atol=1e-8)
+    if "WhiteKernel" not in str(kernel):  # with which theirs are of an observation, and ours of the function
+        ours_std, theirs_std = (model.predict(QUERIES, return_std=True)[1] for model in (ours, theirs))
+        np.testing.assert_allclose(ours_std, theirs_std, rtol=1e-5, atol=1e-7)
+
+
+def test_the_noise_of_a_kernel_is_alpha() -> None:
+    model = KernelRegressor(2.0 * RBF(0.3) + WhiteKernel(0.25)).fit(X, Y)
+    assert model.alpha_ == 0.25
+    assert isinstance(model.kernel_, gramian.KernelUsed)
+    assert model.kernel_.variance == 2.0
+    assert model.kernel_.length_scale == pytest.approx(0.3 * np.sqrt(2), rel=1e-15)
+
+
+@pytest.mark.parametrize("kernel", [DotProduct(), RBF(1) + RBF(2), RBF(1) * Matern(1), WhiteKernel(), RBF(1) ** 2])
+def test_other_kernels_of_scikit_learn_are_refused(kernel: Any) -> None:
+    with pytest.raises(
+        ValueError, match="what can be converted is RBF or Matern, times ConstantKernel, plus WhiteKernel"
+    ):
+        KernelRegressor(kernel).fit(X, Y)

@@ -12,7 +12,8 @@ use gramian_numerics::surface::local::SurfaceHyperparameters;
 
 /// What local regressions learned of a cloud.
 ///
-/// Sent as `hyperparameters` of a request about a part of the cloud, they are used as they are.
+/// Send it back as it came, as `hyperparameters` of a request about a part of the cloud. It is opaque: its
+/// members may change in any version, and one of another version may be refused.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Hyperparameters {

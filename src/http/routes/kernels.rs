@@ -68,7 +68,7 @@ impl KernelDescription {
         match family {
             KernelFamily::Gauss => Self {
                 family,
-                formula: "exp(-r^2)",
+                formula: "exp(-r^2), the RBF of scikit-learn with length_scale/sqrt(2)",
                 smoothness: "analytic",
                 parameters: vec![],
                 max_dimension: None,

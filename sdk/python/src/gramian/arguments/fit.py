@@ -87,7 +87,8 @@ class Kernel:
     """A kernel `k(x, y) = variance · φ(r²)`.
 
     Here `r = |x − y|/length_scale` or `r² = Σ (x_c − y_c)²/length_scales_c²`. The service chooses parameters
-    that are None. `Client.kernels()` lists the families with their formulas.
+    that are None. `Client.kernels()` lists the families with their formulas. `gauss` is exp(−r²): scikit-learn's
+    `RBF(length_scale=l)`, exp(−r²/2), is `gauss` with `length_scale` √2 l.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""A regressor with the interface of scikit-learn. Needs scikit-learn, the extra `gramian[sklearn]`."""
+"""Gaussian-process regression with the interface of scikit-learn."""
 
 from __future__ import annotations
 
@@ -7,24 +7,21 @@ from typing import Any, Literal, Self, overload
 
 import numpy as np
 import numpy.typing as npt
+from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
+from sklearn.gaussian_process.kernels import Kernel as SklearnKernel
+from sklearn.utils import check_random_state
+from sklearn.utils.validation import check_is_fitted, validate_data
 
-from .answers import Posterior
-from .arguments.fit import Duplicates, KernelLike, Mean, Number, Quantity, Solver
-from .client import Client
-from .resources.cloud import Cloud
-from .rest.models import KernelUsed, SolverUsed
-from .rest.types import Unset
-from .service import shared_client
-from .wire.problems import NotPositiveDefinite, Problem
-from .wire.tensors import Array
-
-try:
-    from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
-    from sklearn.utils import check_random_state
-    from sklearn.utils.validation import check_is_fitted, validate_data
-except ImportError as error:
-    message = "gramian.sklearn needs scikit-learn, 1.6 or later: pip install 'gramian[sklearn]'"
-    raise ImportError(message, name="sklearn") from error
+from ..answers import Posterior
+from ..arguments.fit import Duplicates, KernelLike, Mean, Number, Quantity, Solver
+from ..client import Client
+from ..resources.cloud import Cloud
+from ..rest.models import KernelUsed, SolverUsed
+from ..rest.types import Unset
+from ..service import shared_client
+from ..wire.problems import NotPositiveDefinite, Problem
+from ..wire.tensors import Array
+from .kernels import converted, is_of_sklearn
 
 
 class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type: ignore[misc]  # sklearn has no types
@@ -37,13 +34,15 @@ class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
 
     Parameters
     ----------
-    kernel : str, dict or Kernel, optional
+    kernel : str, dict, Kernel or a kernel of scikit-learn, optional
         A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a dictionary,
-        with `length_scales` for one per feature), or `kernel_` of another regressor. If absent, learned from
-        the values by their likelihood. If given, nothing is learned.
+        with `length_scales` for one per feature), or `kernel_` of another regressor. Of
+        `sklearn.gaussian_process.kernels`, `RBF` or `Matern`, times `ConstantKernel`, plus `WhiteKernel`. If
+        absent, learned from the values by their likelihood. If given, nothing is learned.
+        `"gauss"` is exp(−r²/ℓ²), which is `RBF` with `length_scale` ℓ/√2.
     alpha : float or array_like, `[n]`, optional
-        Noise variance of all samples or of each, in the unit of `y` squared. If absent, learned if the kernel
-        is, else 1e-10.
+        Noise variance of all samples or of each, in the unit of `y` squared. That of a `WhiteKernel` is added.
+        If absent, learned if the kernel is, else 1e-10.
     mean : str, optional
         Mean of the function, beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the features. If
         absent, a constant where `kernel` is absent too, else zero.
@@ -89,7 +88,7 @@ class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
 
     def __init__(
         self,
-        kernel: KernelLike | None = None,
+        kernel: KernelLike | SklearnKernel | None = None,
         *,
         alpha: Number | npt.ArrayLike | None = None,
         mean: Mean | None = None,
@@ -216,6 +215,11 @@ class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
         """Returns the parameters as keywords of `Cloud.posterior`."""
         choices = {name: getattr(self, name) for name in ("kernel", "mean", "solver", "duplicates")}
         alpha: Any = self.alpha
+        if is_of_sklearn(self.kernel):
+            same = converted(self.kernel)
+            choices["kernel"] = same.kernel
+            if same.noise is not None:
+                alpha = same.noise if alpha is None else np.add(alpha, same.noise)
         shape = np.shape(alpha)
         if shape not in ((), (n,)):
             raise ValueError(f"alpha is to be a number, or one for each of the {n} samples, not of the shape {shape}")
