@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NoReturn, Self, SupportsFloat, TypeVar, cast
@@ -19,6 +19,7 @@ from .arguments.fit import Whole
 from .arguments.keywords import suggest_names
 from .arguments.normalise import CLIENT, REQUEST, normalise
 from .arguments.registration import register, register_file
+from .arguments.tables import Table, columns_of
 from .resources.cloud import Cloud
 from .rest.models import CloudList, Job, KernelDescription, KernelList, Version
 from .wire.connection import Connection
@@ -143,7 +144,11 @@ class Client:
         return client.set_httpx_client(http)
 
     def cloud(
-        self, points: npt.ArrayLike | str | os.PathLike[str] | bytes, normals: npt.ArrayLike | None = None
+        self,
+        points: npt.ArrayLike | Table | str | os.PathLike[str] | bytes,
+        normals: npt.ArrayLike | None = None,
+        *,
+        columns: Sequence[str] | None = None,
     ) -> Cloud:
         """Registers points. The cloud keeps a copy of them, in case the service forgets them.
 
@@ -152,16 +157,24 @@ class Client:
         points : array_like, `[n, d]`, or str, os.PathLike or bytes
             A row of coordinates for each point, also on a line: `[[0.0], [0.5]]`. Or a PLY file, as scanners
             write it: a path that ends in `.ply`, or the bytes. Its vertices are the points, with their
-            normals. The service reads the file, so that the cloud has no `points` here.
+            normals. The service reads the file, so that the cloud has no `points` here. Arrays of other
+            libraries are read through `__array__`.
         normals : array_like, `[n, d]`, optional
             Normals of any length but 0, if known. Their side is the outward one. Not allowed with a file,
             which has normals itself.
+        columns : sequence of str, optional
+            Names of the coordinates, if `points` is a table: a DataFrame, a Dataset, a structured array or a
+            dictionary of columns.
 
         Examples
         --------
         >>> gramian.Client().cloud([[0, 0], [1, 0], [0, 1]])
         Cloud(id='f70083fe…', n_points=3, dimension=2)
+        >>> gramian.Client().cloud({"x": [0, 1, 0], "y": [0, 0, 1], "height": [3, 2, 2]}, columns=["x", "y"])
+        Cloud(id='f70083fe…', n_points=3, dimension=2)
         """
+        if columns is not None:
+            points = columns_of(points, columns)
         file = _ply_file(points)
         if file is not None:
             if normals is not None:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import atexit
 import os
 import threading
+from collections.abc import Sequence
 
 import numpy.typing as npt
 
+from ..arguments.tables import Table
 from ..client import Client
 from ..resources.cloud import Cloud
 from .process import LocalService
@@ -73,7 +75,12 @@ def shared_client(address: str | None = None) -> Client:
     return _shared.client(address)
 
 
-def cloud(points: npt.ArrayLike | str | os.PathLike[str] | bytes, normals: npt.ArrayLike | None = None) -> Cloud:
+def cloud(
+    points: npt.ArrayLike | Table | str | os.PathLike[str] | bytes,
+    normals: npt.ArrayLike | None = None,
+    *,
+    columns: Sequence[str] | None = None,
+) -> Cloud:
     """Registers points with a service that needs no preparation.
 
     It is the service at `GRAMIAN_URL`. Without this variable it is one on this machine. It is started at the
@@ -86,6 +93,8 @@ def cloud(points: npt.ArrayLike | str | os.PathLike[str] | bytes, normals: npt.A
         A row of coordinates for each point, or a PLY file, as for `Client.cloud`.
     normals : array_like, `[n, d]`, optional
         Normals of any length but 0, if known. Their side is the outward one.
+    columns : sequence of str, optional
+        Names of the coordinates, if `points` is a table, as for `Client.cloud`.
 
     Raises
     ------
@@ -99,4 +108,4 @@ def cloud(points: npt.ArrayLike | str | os.PathLike[str] | bytes, normals: npt.A
     >>> gramian.cloud([[0, 0], [1, 0], [0, 1]])
     Cloud(id='f70083fe…', n_points=3, dimension=2)
     """
-    return shared_client().cloud(points, normals)
+    return shared_client().cloud(points, normals, columns=columns)

@@ -53,7 +53,7 @@ def converted(kernel: SklearnKernel) -> Converted:
     return Converted(_correlation(correlated[0]), sum(white) if white else None)
 
 
-def _parts(kernel: Any, kind: type) -> list[Any]:  # noqa: ANN401  # sklearn has no types
+def _parts(kernel: Any, kind: Any) -> list[Any]:  # noqa: ANN401  # sklearn has no types
     """Returns the terms of a sum, or the factors of a product."""
     return _parts(kernel.k1, kind) + _parts(kernel.k2, kind) if isinstance(kernel, kind) else [kernel]
 
