@@ -1,0 +1,4 @@
+//! Tests under load.
+
+mod contention;
+mod sustained;
