@@ -20,8 +20,8 @@ fn curvature_calibration(bend: f64) -> f64 {
 
 /// Factor on the deviations of second derivatives under a model, by its ratio of the noise to the process.
 ///
-/// Where nearly all is noise, the posterior is that of a quadric, and nothing is left out by the process. Where
-/// both are of one size, the process expects more bends than surfaces have (docs/error-bars.md).
+/// Where nearly all is noise, the posterior is that of a quadric. Where both are of one size, the process
+/// expects more bends than surfaces have (docs/error-bars.md).
 fn bend_calibration(noise: f64) -> f64 {
     match noise {
         ..0.003 => 1.0,

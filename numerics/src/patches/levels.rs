@@ -23,8 +23,8 @@ pub const N_BIASES: usize = 9;
 /// Ratios of the variance of the bias to that of the difference without it.
 const EXCESSES: [f64; N_BIASES] = [0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 1000.0];
 
-/// Least ratio that is a bias. Smaller ones are variances that are somewhat off: a few tenths of V may be many
-/// times the variance of the coarser level, and would make the bars of smooth surfaces longer.
+/// Least ratio that is a bias. Smaller ones are variances that are somewhat off. A few tenths of V may be
+/// many times the variance of the coarser level, and would make the bars of smooth surfaces longer.
 const LEAST_BIAS: f64 = 1.0;
 
 /// Share of the places below which a ratio is left out: what single places have may as well be a fine level

@@ -31,8 +31,8 @@ const STIFF: f64 = 4.0;
 const ROUGH_ORDER: u8 = 2;
 const ROUGH_LENGTH_SCALE: f64 = 3.0;
 
-/// Candidate ratios for this process. With more noise, nothing tells it from the smoother one: it would take a
-/// third of the neighbourhoods of smooth surfaces, and make bars longer there (docs/error-bars.md).
+/// Candidate ratios for this process. With more noise, nothing tells it from the smoother one. It would take
+/// a third of the neighbourhoods of smooth surfaces, and make bars longer there (docs/error-bars.md).
 const ROUGH_NOISES: [f64; 4] = [0.0, 1e-8, 1e-6, 1e-4];
 
 /// Candidate ratios of the variance of the noise to that of the process.
