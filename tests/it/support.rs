@@ -13,7 +13,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::oneshot;
 
 use crate::common::clouds;
-use crate::contract::{self, Received};
+use crate::document::contract::{self, Received};
 
 /// A server in this process, on a free port. Drains when dropped.
 pub struct Server {

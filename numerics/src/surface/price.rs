@@ -66,8 +66,8 @@ pub(crate) fn signature_surface_price(n_points: usize, dimension: usize) -> Pric
     let n = n_points as f64;
     let at_points = n * pair_flops(dimension, 2) + quadric_flops(n_points, dimension);
     let flops = n * at_points + 2.0 * sampling_flops(n_points, dimension);
-    // In three dimensions, 4.5 kB were measured when quadrics were small vectors (tests/it/memory.rs). Now it
-    // is a bound.
+    // In three dimensions, 4.5 kB were measured when quadrics were small vectors
+    // (tests/it/process/memory.rs). Now it is a bound.
     let own = Price { n_bytes: n_points.saturating_mul(1500 + 400 * dimension * dimension), flops };
     // The noise of a plane curve is estimated by local regressions, which orient it if it is noisy.
     if dimension == 2 { own.and(local_surface_price(n_points, dimension)) } else { own }

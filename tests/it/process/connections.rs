@@ -8,7 +8,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 
 use crate::document::contract::{self, Received};
-use crate::routes::route_of;
+use crate::all_routes::route_of;
 use crate::support::{Server, fibonacci_sphere, pause};
 
 /// Timeout of a wait. Longer than anything here should take, even on a busy machine.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::json;
 
-use crate::routes::route_of;
+use crate::all_routes::route_of;
 use crate::support::{Server, pause};
 
 /// Returns the samples by name and labels, as they are written.

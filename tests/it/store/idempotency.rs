@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::routes::route_of;
+use crate::all_routes::route_of;
 use crate::running::Process;
 use crate::store::durable::Folder;
 use crate::store::jobs::{delete, result};

@@ -45,8 +45,8 @@ answer! {
     pub struct NormalsResponse {
         /// The normal at each query, of length 1. Null where there is none.
         normals: Array as Vec<Option<Vec<f64>>>,
-        /// |∇u| at each query for the function in `surface_models`: unit 1/length for `signature`, about 1 for
-        /// `offset`.
+        /// |∇u| at each query for the function in `surface_models`: unit 1/length for `signature`, about 1
+        /// for `offset`.
         gradient_norms: Array as Vec<f64>,
         /// The signature function at each query: 1 on the surface, usually more inside a closed one.
         levels: Array as Vec<f64>,

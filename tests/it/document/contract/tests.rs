@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use super::document::Contract;
 use super::validator::Validator;
 use super::{BESIDE, Received, is_beside};
-use crate::routes::route_of;
+use crate::all_routes::route_of;
 use crate::support::{Server, document, receive};
 
 const PATH: &str = "/v1/curvatures";

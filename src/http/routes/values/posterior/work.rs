@@ -363,7 +363,8 @@ impl Bands<'_> {
         Ok(Some(quantiles))
     }
 
-    /// Returns the probabilities `Φ((μ − t)/√(σ² + σ₀²))` of exceeding the threshold t, `[k, m]`, σ₀² the noise.
+    /// Returns the probabilities `Φ((μ − t)/√(σ² + σ₀²))` of exceeding the threshold t, `[k, m]`. σ₀² is the
+    /// noise.
     ///
     /// Where σ² + σ₀² is 0, the probability is 1 for means above the threshold, else 0.
     ///
