@@ -7,8 +7,8 @@ use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 
-use crate::document::contract::{self, Received};
 use crate::all_routes::route_of;
+use crate::document::contract::{self, Received};
 use crate::support::{Server, fibonacci_sphere, pause};
 
 /// Timeout of a wait. Longer than anything here should take, even on a busy machine.

@@ -5,8 +5,8 @@ use std::net::TcpStream;
 
 use serde_json::{Value, json};
 
-use crate::process::connections::http_2;
 use crate::all_routes::route_of;
+use crate::process::connections::http_2;
 use crate::running::Process;
 use crate::store::durable::Folder;
 use crate::store::jobs::{ask, delete, result};

@@ -33,8 +33,6 @@ class Diagnostics:
             answer.
         solver (SolverUsed): The solver that was used.
         factorization (FactorizationUsed): The factorization of the Gram matrix.
-
-            `bunch_kaufman`, `partial_pivoting_lu` and `conjugate_gradients` are reserved: no answer has them yet.
         n_merged_duplicates (int): Number of points that were merged into an earlier point.
         warnings (list[Warning_]): Changes that were made, and limits of the accuracy.
         alpha (float | Unset): The number added to the diagonal. Absent with `noise_variances`.
@@ -66,7 +64,8 @@ class Diagnostics:
             length.
         hyperparameters (Hyperparameters | Unset): What local regressions learned of a cloud.
 
-            Sent as `hyperparameters` of a request about a part of the cloud, they are used as they are.
+            Send it back as it came, as `hyperparameters` of a request about a part of the cloud. It is opaque: its
+            members may change in any version, and one of another version may be refused.
         reach (int | Unset): Number of positions around a point on which the answer there depends, with local
             regressions.
         stencils (StencilsUsed | Unset): Number of rows of a sparse operator by how their weights were computed.

@@ -19,7 +19,8 @@ T = TypeVar("T", bound="Hyperparameters")
 class Hyperparameters:
     """What local regressions learned of a cloud.
 
-    Sent as `hyperparameters` of a request about a part of the cloud, they are used as they are.
+    Send it back as it came, as `hyperparameters` of a request about a part of the cloud. It is opaque: its
+    members may change in any version, and one of another version may be refused.
 
         Attributes:
             noise_ratios (list[NoiseRatio]): Mixture of noise ratios. Empty where nothing can be regressed.

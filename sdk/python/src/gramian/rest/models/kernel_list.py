@@ -20,7 +20,7 @@ class KernelList:
     """All kernel families.
 
     Attributes:
-        kernels (list[KernelDescription]): The families, in the order in which the documentation names them.
+        kernels (list[KernelDescription]): All families.
     """
 
     kernels: list[KernelDescription]
