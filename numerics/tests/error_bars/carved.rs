@@ -82,8 +82,8 @@ pub fn carved(noise: f64) -> Comparison {
 fn fine_detail_is_not_taken_for_noise() {
     for spacings in [0.1, 0.3, 0.5] {
         let Comparison { noise, median, plane, covered } = carved(spacings);
-        // Noise was 3 to 7 times as much, means of 72 points were regressed, and normals off by 4.5 degrees. At
-        // half a spacing means of 24 were.
+        // Noise was 3 to 7 times as much, means of 72 points were regressed, and normals off by 4.5 degrees.
+        // At half a spacing means of 24 were.
         assert!((0.8..1.25).contains(&noise), "{spacings}: {noise}");
         assert!(median <= plane, "{spacings}: {median}, {plane}");
         // Bars covered 19, 26 and 47 %.
