@@ -88,7 +88,7 @@ def test_the_fit_of_an_answer_repeats_it(cloud: Any, method: str, fit: dict[str,
 
 
 @every_operator
-@pytest.mark.parametrize("surface", GEOMETRIES.values(), ids=GEOMETRIES.keys())
+@pytest.mark.parametrize("geometry", GEOMETRIES.values(), ids=GEOMETRIES.keys())
 @pytest.mark.parametrize("fit", [{}, FITS["noise"], FITS["kernel"]], ids=["nothing", "noise", "kernel"])
 def test_so_it_does_with_a_geometry(cloud: Any, method: str, fit: dict[str, Any], geometry: dict[str, Any]) -> None:
     answer = ask(cloud, method, **fit, surface=geometry)

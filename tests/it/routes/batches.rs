@@ -27,6 +27,12 @@ fn assert_close(found: &Value, expected: &Value, tolerance: f64) {
     }
 }
 
+fn with(body: &Value, member: &str, value: Value) -> Value {
+    let mut body = body.clone();
+    body[member] = value;
+    body
+}
+
 #[tokio::test]
 async fn lists_share_a_fit_and_are_answered_as_each_alone() {
     let server = Server::start().await;
@@ -136,10 +142,18 @@ async fn quantiles_and_exceedances_are_those_of_normal_distributions() {
             assert!((answer["quantiles"][row][query].as_f64().unwrap() - expected).abs() < 1e-13);
         }
     }
-    // Far away the observation is normal with variance 1.04 and mean 0: Φ(−0.25/√1.04), by scipy.stats.norm.
-    let probabilities = numbers(&answer["exceedance_probabilities"]);
-    assert!((probabilities[2] - 0.40317086).abs() < 1e-3, "{probabilities:?}");
-    assert!(probabilities.iter().all(|p| (0.0..=1.0).contains(p)));
+    // Far away the function is normal with variance 1 and mean 0: Φ(−0.25), by scipy.stats.norm. The variance
+    // of an observation is 1.04.
+    let observed = server.post("/v1/posterior", &with(&body, "of", json!("observation"))).await.expect_ok();
+    for (answer, expected) in [(&answer, 0.40129367), (&observed, 0.40317086)] {
+        let probabilities = numbers(&answer["exceedance_probabilities"]);
+        assert!((probabilities[2] - expected).abs() < 1e-3, "{probabilities:?}");
+        assert!(probabilities.iter().all(|p| (0.0..=1.0).contains(p)));
+    }
+    for (query, variance) in numbers(&observed["observation_variances"]).iter().enumerate() {
+        let expected = means[query] + 1.959963984540054 * variance.sqrt();
+        assert!((observed["quantiles"][2][query].as_f64().unwrap() - expected).abs() < 1e-13);
+    }
     let deviations = json!({"cloud": {"points": points}, "values": values[0], "queries": QUERIES, "kernel": kernel, "alpha": 0.04,
         "derivatives": 1, "include": ["std"]});
     let deviations = server.post("/v1/interpolation", &deviations).await.expect_ok();
@@ -153,6 +167,24 @@ async fn quantiles_and_exceedances_are_those_of_normal_distributions() {
         let answer = server.post("/v1/posterior", &body).await.expect_ok();
         assert!((numbers(&answer["exceedance_probabilities"])[0] - expected).abs() < 1e-9);
     }
+}
+
+/// Draws of an observation are those of the function with noise of variance α on top.
+#[tokio::test]
+async fn draws_of_an_observation_have_the_noise() {
+    let server = Server::start().await;
+    let (points, values) = lists(60, 1);
+    let body = json!({"cloud": {"points": points}, "values": values[0], "queries": QUERIES,
+        "kernel": {"family": "gauss", "length_scale": 0.8}, "alpha": 0.04, "samples": {"count": 4000, "seed": 5}});
+    let of_function = server.post("/v1/posterior", &body).await.expect_ok();
+    let observed = server.post("/v1/posterior", &with(&body, "of", json!("observation"))).await.expect_ok();
+    let [function, observed] = [&of_function, &observed].map(|answer| numbers(&answer["samples"]));
+    let noise: Vec<f64> = observed.iter().zip(&function).map(|(a, b)| a - b).collect();
+    let n = noise.len() as f64;
+    let (mean, square) = (noise.iter().sum::<f64>() / n, noise.iter().map(|x| x * x).sum::<f64>() / n);
+    // Five standard errors: of 12,000 draws of variance 0.04.
+    assert!(mean.abs() < 5.0 * 0.2 / n.sqrt(), "{mean}");
+    assert!((square - 0.04).abs() < 5.0 * 0.04 * (2.0 / n).sqrt(), "{square}");
 }
 
 #[tokio::test]
@@ -215,8 +247,10 @@ async fn what_is_no_batch_or_no_probability_is_refused() {
     let mut body = posterior.clone();
     body["threshold"] = json!(1.0);
     body["noise_variances"] = noisy;
+    server.post("/v1/posterior", &body).await.expect_ok();
+    body["of"] = json!("observation");
     let problem = server.post("/v1/posterior", &body).await.expect_problem(422, "invalid-request");
-    assert_eq!(problem["errors"][0]["pointer"], "/threshold");
+    assert_eq!(problem["errors"][0]["pointer"], "/of");
     // A request for more draws than an answer may hold is refused before any is drawn.
     let mut body = posterior;
     body["samples"] = json!({"count": 1_000_000_000u64});

@@ -30,7 +30,7 @@ fn unflagged_and_off(answer: &Value) -> (usize, usize) {
     for entry in answer["flags"].as_array().unwrap() {
         is_flagged[entry["query"].as_u64().unwrap() as usize] = true;
     }
-    let found = numbers(&answer["values"]);
+    let found = numbers(&answer["laplacians"]);
     let unflagged: Vec<usize> = (0..N).filter(|&query| !is_flagged[query]).collect();
     let points = fibonacci_sphere(N);
     let is_off =

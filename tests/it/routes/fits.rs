@@ -54,7 +54,7 @@ async fn defaults_are_said_in_the_answer_and_pinning_them_repeats_it() {
             };
             assert_eq!(diagnostics["kernel"]["family"], family, "{}", route.path);
             assert!(diagnostics["kernel"]["length_scale"].as_f64().unwrap() > 0.0);
-            assert_eq!(diagnostics["kernel"]["variances"], 1.0);
+            assert_eq!(diagnostics["kernel"]["variance"], 1.0);
             if kernel != "absent" || is_value {
                 assert_eq!(diagnostics["alpha"], 1e-10, "{}", route.path);
             }

@@ -85,7 +85,7 @@ async fn one_factor_serves_kernels_of_every_variance() {
     let four = four.expect_ok();
     assert_eq!(one["means"], four["means"]);
     assert_eq!(4.0 * numbers(&one["variances"])[0], numbers(&four["variances"])[0]);
-    assert_eq!(four["diagnostics"]["kernel"]["variances"], 4.0);
+    assert_eq!(four["diagnostics"]["kernel"]["variance"], 4.0);
     assert_eq!(four["diagnostics"]["alpha"], 0.04);
     let of = |answer: &Value, member: &str| answer["diagnostics"][member].as_f64().unwrap();
     assert!((of(&one, "native_norm_squared") / of(&four, "native_norm_squared") - 4.0).abs() < 1e-12);
@@ -116,7 +116,7 @@ async fn operators_of_measured_values_have_bars_that_cover() {
     let mut body = json!({"cloud": {"points": points}, "values": values, "include": ["std"]});
     let answer = server.post("/v1/laplace-beltrami", &body).await.expect_ok();
     let truth: Vec<f64> = points.iter().map(|x| -2.0 * x[2]).collect();
-    let (found, bars) = (numbers(&answer["values"]), numbers(&answer["value_std"]));
+    let (found, bars) = (numbers(&answer["laplacians"]), numbers(&answer["laplacian_std"]));
     let error = root_mean_square(found.iter().zip(&truth).map(|(a, b)| a - b));
     // If the values were taken as exact, noise would exceed the signal: the Laplacian of noise is 7σ/h².
     assert!(error < 0.1, "{error}");

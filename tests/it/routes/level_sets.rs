@@ -96,7 +96,7 @@ async fn what_cannot_be_meshed_is_refused_with_a_remedy() {
         (json!({"cloud": {"points": in_four}}), "invalid-cloud", "/cloud/points"),
         (json!({"cloud": sphere, "step": 0.0}), "invalid-request", "/step"),
         (json!({"cloud": sphere, "level": 1.0}), "invalid-request", "/level"),
-        (json!({"cloud": sphere, "surface_model": "offset"}), "invalid-request", "/surface"),
+        (json!({"cloud": sphere, "surface_model": "offset"}), "invalid-request", "/surface_model"),
         (json!({"cloud": sphere, "bounds": bounds}), "invalid-request", "/bounds/max/1"),
         (
             json!({"cloud": sphere, "bounds": {"min": [0.0], "max": [1.0]}}),

@@ -28,7 +28,7 @@ async fn deviations_are_asked_for_by_name() {
     assert_eq!(numbers(&answer["principal_curvature_std"]).len(), 1000);
     assert_eq!(numbers(&answer["gaussian_curvature_std"]).len(), 500);
     assert_eq!(answer["diagnostics"]["solver"], "local");
-    assert_eq!(answer["surface_models"][0], "local");
+    assert_eq!(answer["surface_models"][0], "regression");
     assert!(answer["diagnostics"]["solver_reason"].as_str().unwrap().contains("std"));
     assert!(answer["diagnostics"].get("rank").is_none());
     let without = server.post("/v1/curvatures", &json!({"cloud": {"points": points}})).await.expect_ok();
@@ -137,7 +137,7 @@ async fn too_few_points_for_an_operator_are_said_to_be() {
         let values: Vec<f64> = points.iter().map(|x| x[0]).collect();
         let request = json!({"cloud": {"points": points}, "solver": "local", "values": values});
         let applied = server.post("/v1/laplace-beltrami", &request).await.expect_ok();
-        assert!(applied["values"].as_array().unwrap().iter().all(|value| value.is_number()));
+        assert!(applied["laplacians"].as_array().unwrap().iter().all(|value| value.is_number()));
         let slopes = server.post("/v1/surface-gradient", &request).await.expect_ok();
         let rows = slopes["gradients"].as_array().unwrap();
         assert!(rows.len() == n && rows.iter().all(|row| row.is_array()));
@@ -165,7 +165,7 @@ async fn what_local_regressions_lack_is_refused_by_name() {
         (
             "/v1/curvatures",
             json!({"cloud": {"points": vec![[0.0; 5], [1.0; 5]]}, "surface_model": "regression"}),
-            "/surface",
+            "/surface_model",
         ),
     ];
     for (path, body, pointer) in cases {
@@ -232,7 +232,7 @@ async fn operators_of_noisy_values_have_bars_that_hold_whatever_the_solver() {
     });
     let answer = server.post("/v1/laplace-beltrami", &body).await.expect_ok();
     assert_eq!(answer["diagnostics"]["solver"], "local");
-    let (found, bars) = (numbers(&answer["values"]), numbers(&answer["value_std"]));
+    let (found, bars) = (numbers(&answer["laplacians"]), numbers(&answer["laplacian_std"]));
     let off = |i: usize| (found[i] + 2.0 * points[i][2]).abs();
     let n_within = (0..2000).filter(|&i| off(i) <= 1.96 * bars[i]).count();
     assert!(n_within >= 1760, "{n_within} of 2000 within their bars");

@@ -211,7 +211,7 @@ async fn too_many_points_and_too_much_that_is_free_are_refused_beforehand() {
     for (vary, families, pointer) in [
         (json!([free("length_scale"), free("length_scales")]), json!(["gauss"]), "/vary/0"),
         (json!(vec![free("length_scales"); 65]), json!(["gauss"]), "/vary"),
-        (json!([free("variances"), free("nu")]), json!(["gauss"]), "/vary/1"),
+        (json!([free("variance"), free("nu")]), json!(["gauss"]), "/vary/1"),
         (
             json!([{"parameter": "length_scales", "axis": 1, "min": 0.1, "max": 1}]),
             json!(["gauss"]),

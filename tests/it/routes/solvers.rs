@@ -196,7 +196,7 @@ async fn the_answer_says_how_many_landmarks_there_are_and_what_they_leave() {
     let answer = server.post("/v1/interpolation", &body("landmark", &smooth(), &more)).await.expect_ok();
     let diagnostics = &answer["diagnostics"];
     assert!((50..500).contains(&diagnostics["rank"].as_u64().unwrap()), "{diagnostics}");
-    let [remaining, tolerance, residual] = ["remaining_diagonal", "tolerance", "relative_residual"]
+    let [remaining, tolerance, residual] = ["remaining_diagonal", "diagonal_tolerance", "relative_residual"]
         .map(|member| diagnostics[member].as_f64().unwrap());
     assert!(tolerance <= 1e-10 && remaining <= 4.0 * tolerance && residual < 1e-8, "{diagnostics}");
 }

@@ -308,7 +308,7 @@ async fn curvatures_that_the_neighbours_do_not_confirm_are_served_and_flagged() 
         let member = match path {
             "/v1/surface-gradient" => "gradients",
             _ if path.ends_with("matrix") => "matrix",
-            _ => "values",
+            _ => "laplacians",
         };
         assert!(answer[member].as_array().unwrap().iter().all(|entry| !entry.is_null()), "{path}");
     }

@@ -59,7 +59,7 @@ async fn a_body_of_another_form_is_found() {
     case.finds_in_body("body/mean_curvatures/0", |body| body["mean_curvatures"][0] = json!("1"));
     // Null may only replace a whole entry.
     case.finds_in_body("body/normals/0", |body| body["normals"][0] = json!([null, null, null]));
-    case.finds_in_body("body/surfaces/1", |body| body["surface_models"][1] = json!("plane"));
+    case.finds_in_body("body/surface_models/1", |body| body["surface_models"][1] = json!("plane"));
     case.finds_in_body("body/diagnostics/rank", |body| body["diagnostics"]["rank"] = json!(-1));
     case.finds_in_body("frobnicate", |body| body["frobnicate"] = json!(1));
     case.finds_in_body("frobnicate", |body| body["diagnostics"]["kernel"]["frobnicate"] = json!(1));
