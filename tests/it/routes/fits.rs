@@ -100,7 +100,7 @@ async fn the_surface_may_come_from_another_cloud_and_kernel_than_the_values() {
     assert_eq!(applied["diagnostics"]["n_points"], 150);
     // On the unit sphere Δz = −2z. Without queries, the answer is at the points of the surface's cloud.
     let expected: Vec<f64> = turned.iter().map(|x| -2.0 * x[2]).collect();
-    assert_close(&numbers(&applied["values"]), &expected, 1e-3);
+    assert_close(&numbers(&applied["laplacians"]), &expected, 1e-3);
     let gradients = server.post("/v1/surface-gradient", &body).await.expect_ok()["gradients"].clone();
     // The surface gradient of z is e₃ − z x.
     let tangent = |x: &[f64; 3]| [-x[2] * x[0], -x[2] * x[1], 1.0 - x[2] * x[2]];
@@ -111,7 +111,7 @@ async fn the_surface_may_come_from_another_cloud_and_kernel_than_the_values() {
     assert_eq!((matrix.as_array().unwrap().len(), matrix[0].as_array().unwrap().len()), (200, 150));
     // Rounding is relative to the entries of the matrix, which are much larger than their sums.
     let largest = numbers(&matrix).iter().fold(0.0f64, |a, b| a.max(b.abs()));
-    assert_close(&times(&matrix, &values), &numbers(&applied["values"]), 1e-10 * largest.max(10.0));
+    assert_close(&times(&matrix, &values), &numbers(&applied["laplacians"]), 1e-10 * largest.max(10.0));
     let matrices = server.post("/v1/surface-gradient/matrix", &body).await.expect_ok()["matrices"].clone();
     for (axis, matrix) in matrices.as_array().unwrap().iter().enumerate() {
         let expected: Vec<f64> = numbers(&gradients).iter().skip(axis).step_by(3).copied().collect();
@@ -169,7 +169,7 @@ async fn merged_duplicates_keep_their_columns_and_share_the_weight() {
         assert_eq!(row.as_array().unwrap().len(), 43);
         assert!(row[3] == row[40] && row[3] == row[42] && row[9] == row[41]);
     }
-    assert_close(&times(&matrix, &values), &numbers(&applied["values"]), 1e-9);
+    assert_close(&times(&matrix, &values), &numbers(&applied["laplacians"]), 1e-9);
     let matrices = server.post("/v1/surface-gradient/matrix", &body).await.expect_ok()["matrices"].clone();
     for (axis, matrix) in matrices.as_array().unwrap().iter().enumerate() {
         let expected: Vec<f64> =

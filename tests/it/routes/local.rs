@@ -29,7 +29,7 @@ async fn deviations_are_asked_for_by_name() {
     assert_eq!(numbers(&answer["gaussian_curvature_std"]).len(), 500);
     assert_eq!(answer["diagnostics"]["solver"], "local");
     assert_eq!(answer["surface_models"][0], "regression");
-    assert!(answer["diagnostics"]["solver_reason"].as_str().unwrap().contains("std"));
+    assert!(answer["diagnostics"]["solver_reason"].as_str().unwrap().contains("deviations"));
     assert!(answer["diagnostics"].get("rank").is_none());
     let without = server.post("/v1/curvatures", &json!({"cloud": {"points": points}})).await.expect_ok();
     assert!(without.get("mean_curvature_std").is_none());
@@ -79,7 +79,7 @@ async fn beyond_the_dense_limit_auto_regresses_locally() {
     let body = json!({"cloud": {"points": points}, "values": values});
     // Δz = −2z on the sphere.
     let answer = server.post("/v1/laplace-beltrami", &body).await.expect_ok();
-    for (found, z) in numbers(&answer["values"]).iter().zip(&values) {
+    for (found, z) in numbers(&answer["laplacians"]).iter().zip(&values) {
         assert!((found + 2.0 * z).abs() < 2e-2, "{found} at {z}");
     }
     let answer = server.post("/v1/surface-gradient", &body).await.expect_ok();
@@ -107,8 +107,8 @@ async fn sparse_matrices_agree_with_the_operators() {
         "cloud": {"points": points}, "solver": "local", "values": values, "include": ["std"],
     });
     let applied = server.post("/v1/laplace-beltrami", &request).await.expect_ok();
-    let deviations = numbers(&applied["value_std"]);
-    let applied = numbers(&applied["values"]);
+    let deviations = numbers(&applied["laplacian_std"]);
+    let applied = numbers(&applied["laplacians"]);
     // The operator reaches π² + 2π. With 600 points the deviations are below 1 % of that.
     let scale = PI * PI + 2.0 * PI;
     assert!(deviations.iter().all(|deviation| *deviation < 0.01 * scale), "{deviations:?}");

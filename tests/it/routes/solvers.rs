@@ -76,7 +76,7 @@ fn operations() -> Vec<Asked> {
         (
             "/v1/laplace-beltrami",
             json!({"values": true, "queries": queries, "surface": on_signature}),
-            vec![("values", 1e-3)],
+            vec![("laplacians", 1e-3)],
         ),
     ]
 }

@@ -119,11 +119,11 @@ async fn operators_live_on_the_surface_that_was_chosen() {
         "queries": [[0.0, 0.0, 0.0]],
     });
     let rescued = server.post("/v1/laplace-beltrami", &body).await.expect_ok();
-    assert_all_near(&numbers(&rescued["values"]), 2.0, 0.01);
+    assert_all_near(&numbers(&rescued["laplacians"]), 2.0, 0.01);
     assert!(detail(&rescued["diagnostics"]["surface"], "offset_model_used").contains("1 of 1"));
     body["surface"] = json!({"model": "signature"});
     let refused = server.post("/v1/laplace-beltrami", &body).await.expect_ok();
-    assert_eq!(refused["values"], json!([null]));
+    assert_eq!(refused["laplacians"], json!([null]));
     assert_eq!(flagged(&refused, "vanishing_gradient"), [0]);
 }
 
