@@ -43,7 +43,7 @@ FITS: dict[str, dict[str, Any]] = {
 }
 GEOMETRIES: dict[str, dict[str, Any]] = {
     "kernel": {"kernel": Kernel("gauss", length_scale=2)},
-    "alpha": {"kernel": "gauss", "alpha": 1e-6, "surface_model": "signature"},
+    "alpha": {"kernel": "gauss", "alpha": 1e-6, "model": "signature"},
     "length scales": {"kernel": Kernel("gauss", length_scales=[2, 1 / 3]), "alpha": 1e-8},
     "noise": {"noise_variances": NOISE},
 }
@@ -132,7 +132,7 @@ def test_so_it_does_where_nothing_but_neighbours_is_fitted(method: str) -> None:
         said += [
             {
                 "solver": "local",
-                "surface": {"cloud": gramian.Client().cloud(1.01 * MANY), "surface_model": "regression"},
+                "surface": {"cloud": gramian.Client().cloud(1.01 * MANY), "model": "regression"},
             }
         ]
     given = {"values": MANY[:, 0]} if "values" in METHODS[method] else {}

@@ -467,7 +467,7 @@ def test_deviations_may_be_asked_for_by_their_own_name(method: str) -> None:
     for absent in [None, UNSET, False]:
         assert sent(method, std=absent, include=UNSET) == sent(method)
     for number in [1, 0.0, "yes", [True]]:
-        with pytest.raises(TypeError, match=r"^deviations is to be True or False, not "):
+        with pytest.raises(TypeError, match=r"^std is to be True or False, not "):
             sent(method, std=number)
     with pytest.raises(ValueError, match=r"^include is 'deviation', .*; did you mean 'deviations'\?$"):
         sent(method, include="deviation")
@@ -509,8 +509,8 @@ def test_other_words_are_refused_with_the_nearest(
 
 
 def test_misspelt_words_of_other_fields_name_the_nearest() -> None:
-    with pytest.raises(ValueError, match=r"^include is 'variances', .*; did you mean 'variance'\?$"):
-        sent("posterior", include="variances")
+    with pytest.raises(ValueError, match=r"^include is 'variancs', .*; did you mean 'variances'\?$"):
+        sent("posterior", include="variancs")
     with pytest.raises(ValueError, match=r"^include\[1\] is 'covarianc', .*; did you mean 'covariance'\?$"):
         sent("posterior", include=["variances", "covarianc"])
     with pytest.raises(TypeError, match=r"^include\[0\] is to be one of .*, not of the type int$"):
@@ -780,7 +780,7 @@ def test_a_geometry_may_be_of_another_cloud(method: str) -> None:
         sent(method, surface={"cloud": CIRCLE})
     with pytest.raises(ValueError, match=r"^surface.cloud is 'gauss', and ids of clouds are 64 hexadecimal digits$"):
         sent(method, surface="gauss")
-    with pytest.raises(TypeError, match=r"^geometry has no 'kernal', but 'kernel', .*; did you mean 'kernel'\?$"):
+    with pytest.raises(TypeError, match=r"^surface has no 'kernal', but 'kernel', .*; did you mean 'kernel'\?$"):
         sent(method, surface={"kernal": "gauss"})
     with pytest.raises(TypeError, match=r"^Surface\(\) has no parameter 'kernal'; did you mean 'kernel'\?$"):
         Surface(kernal="gauss")  # type: ignore[call-arg]
@@ -834,7 +834,7 @@ def test_none_is_as_absent_everywhere(method: str, absent: object) -> None:
             "kernel": absent,
             "noise_variances": absent,
             "solver": absent,
-            "surface_model": absent,
+            "model": absent,
         }
         assert sent(method, surface=nothing)["surface"] == {}
 

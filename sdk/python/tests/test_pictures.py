@@ -84,7 +84,7 @@ def test_answers_draw_themselves(cloud: Any, mesh: gramian.Mesh) -> None:
     assert isinstance(display, SurfaceDisplay)
     assert display.figure_ is display.axes_.figure
     assert (display.mappable_.norm.vmin, display.axes_.get_title()) == (-display.mappable_.norm.vmax, "mean curvatures")
-    assert mesh.plot("position_std").axes_.get_title() == "position deviations"
+    assert mesh.plot("position_std").axes_.get_title() == "position std"
     assert cloud.normals([[1.0, 0, 0], [0, 1.0, 0]]).plot().positions.shape == (2, 3)
     with pytest.raises(ValueError, match="no such_thing"):
         curvatures.plot("such_thing")

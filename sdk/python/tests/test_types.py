@@ -117,7 +117,7 @@ def test_nullable_entries_are_nullable_and_nothing_else_is() -> None:
         assert curvatures[f"{of_what}_std"] == list[float | None] | Unset
     assert fields(models.SurfaceGradientResponse)["gradients"] == list[row | None]
     assert fields(models.SurfaceGradientMatrixResponse)["matrices"] == list[list[row | None]]
-    assert fields(models.LaplaceBeltramiResponse)["values"] == list[float | None]
+    assert fields(models.LaplaceBeltramiResponse)["laplacians"] == list[float | None]
     assert fields(models.LaplaceBeltramiMatrixResponse)["matrix"] == list[row | None]
     assert fields(models.LaplaceBeltramiSparseMatrixResponse)["indices"] == list[int]
     nullable = {model.__name__ for model in OBJECTS for hint in fields(model).values() if type(None) in parts(hint)}
