@@ -83,7 +83,7 @@ public static class Scenario
     private static void ThePosteriorHasAVariance()
     {
         var queries = new List<List<double>> { new List<double> { 0.9, 0.1 } };
-        var include = new List<PosteriorQuantity> { PosteriorQuantity.Variance };
+        var include = new List<PosteriorQuantity> { PosteriorQuantity.Variances };
         var request = new PosteriorRequest(Registered, alpha: 1e-6, values: Cosines, queries: queries, include: include);
         var answer = new ValuesApi(Url).ComputePosterior(request);
         Check(answer.Means.Count == 1 && answer.Variances.Single() >= 0, answer);

@@ -115,7 +115,7 @@ func thePosteriorHasAVariance(t *testing.T, client *gramian.APIClient) {
 	request := gramian.NewPosteriorRequest(cloud(), cosines())
 	request.SetAlpha(1e-6)
 	request.SetQueries([][]float64{{0.9, 0.1}})
-	request.SetInclude([]gramian.PosteriorQuantity{gramian.POSTERIORQUANTITY_VARIANCE})
+	request.SetInclude([]gramian.PosteriorQuantity{gramian.POSTERIORQUANTITY_VARIANCES})
 	answer, _, err := client.ValuesAPI.ComputePosterior(context.Background()).PosteriorRequest(*request).Execute()
 	must(t, err)
 	if len(answer.Means) != 1 || len(answer.Variances) != 1 || !(answer.Variances[0] >= 0) {

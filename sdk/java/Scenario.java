@@ -86,7 +86,7 @@ public class Scenario {
 
     private void thePosteriorHasAVariance() throws ApiException {
         PosteriorRequest request = new PosteriorRequest().cloud(cloud()).values(COSINES).alpha(1e-6);
-        request.queries(List.of(List.of(0.9, 0.1))).include(List.of(PosteriorQuantity.VARIANCE));
+        request.queries(List.of(List.of(0.9, 0.1))).include(List.of(PosteriorQuantity.VARIANCES));
         var answer = new ValuesApi(client).computePosterior(request);
         check(answer.getMeans().size() == 1 && answer.getVariances().size() == 1, answer);
         check(answer.getVariances().get(0) >= 0, answer);

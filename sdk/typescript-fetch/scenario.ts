@@ -88,7 +88,7 @@ async function theMatrixTurnsCosinesIntoTheirNegatives() {
 }
 
 async function thePosteriorHasAVariance() {
-    const include = [PosteriorQuantity.Variance];
+    const include = [PosteriorQuantity.Variances];
     const posteriorRequest = { cloud, values: cosines, queries: [[0.9, 0.1]], alpha: 1e-6, include };
     const { means, variances } = await new ValuesApi(configuration).computePosterior({ posteriorRequest });
     assert.equal(means.length, 1);

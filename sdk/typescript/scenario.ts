@@ -64,7 +64,7 @@ async function theMatrixTurnsCosinesIntoTheirNegatives() {
 
 async function thePosteriorHasAVariance() {
     const { data } = await computePosterior({
-        body: { cloud, values: cosines, queries: [[0.9, 0.1]], alpha: 1e-6, include: [PosteriorQuantity.VARIANCE] },
+        body: { cloud, values: cosines, queries: [[0.9, 0.1]], alpha: 1e-6, include: [PosteriorQuantity.VARIANCES] },
         throwOnError: true,
     });
     assert.equal(data.means.length, 1);

@@ -73,7 +73,7 @@ async fn the_matrix_turns_cosines_into_their_negatives(client: &Client, id: &Clo
 
 async fn the_posterior_has_a_variance(client: &Client, id: &CloudId) -> Outcome {
     let queries = rows(&[[0.9, 0.1]]);
-    let include = vec![PosteriorQuantity::Variance];
+    let include = vec![PosteriorQuantity::Variances];
     let answer = client
         .compute_posterior()
         .body_map(|body| {
