@@ -249,7 +249,8 @@ test("a hostile link and a hostile file put nothing into the snippets", () => {
   });
   return opened(`#${link}`, async (page) => {
     await settled(page);
-    for (const name of ["solver", "surfaceModel", "family"]) assert.equal(await page.inputValue(`[name=${name}]`), "auto");
+    for (const name of ["solver", "surfaceModel", "family"])
+      assert.equal(await page.inputValue(`[name=${name}]`), "auto");
     await open(
       page,
       `${text}.ply`,

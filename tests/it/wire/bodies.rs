@@ -137,7 +137,7 @@ fn as_safetensors(request: &Value) -> Vec<u8> {
     let mut rest = request.clone();
     let mut tensors = Vec::new();
     for name in
-        ["values", "queries", "cloud.points", "geometry.cloud.points", "noise_variances", "points", "normals"]
+        ["values", "queries", "cloud.points", "surface.cloud.points", "noise_variances", "points", "normals"]
     {
         let (parent, member) = name.rsplit_once('.').unwrap_or(("", name));
         let pointer =
