@@ -16,7 +16,7 @@ use crate::problem::catalogue;
 use npy::Npy;
 use tensor::Tensor;
 
-/// Most segments of a tensor name, as in `geometry.cloud.points`. The last segment keeps any further dots.
+/// Most segments of a tensor name, as in `surface.cloud.points`. The last segment keeps any further dots.
 const MAX_DEPTH: usize = 3;
 
 /// Longest header in bytes.
