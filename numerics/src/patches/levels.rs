@@ -278,7 +278,7 @@ mod tests {
     fn variances_that_are_somewhat_off_are_no_bias() {
         let mut random = Random::of(3, 0);
         let coarse = drawn(&mut random, 0.02);
-        // Fine levels are off by a tenth more than they say. Their deviations are 1.07 times those of the posterior.
+        // Fine levels are off by a tenth more than they say, beside the factor 1.07 of their deviations.
         let apart = drawn(&mut random, 1.03 * (0.1f64.powi(2) - 0.02f64.powi(2)).sqrt());
         let fine: Vec<f64> = coarse.iter().zip(&apart).map(|(c, apart)| c + apart).collect();
         let (share, deviation) = covered(&refined(&fine, &coarse).0);

@@ -469,10 +469,10 @@ def test_deviations_may_be_asked_for_by_their_own_name(method: str) -> None:
     for number in [1, 0.0, "yes", [True]]:
         with pytest.raises(TypeError, match=r"^std is to be True or False, not "):
             sent(method, std=number)
-    with pytest.raises(ValueError, match=r"^include is 'deviation', .*; did you mean 'deviations'\?$"):
-        sent(method, include="deviation")
-    with pytest.raises(TypeError, match=rf"^{method}\(\) has no parameter 'deviation'; did you mean 'deviations'\?$"):
-        sent(method, deviation=True)
+    with pytest.raises(ValueError, match=r"^include is 'stds', .*; did you mean 'std'\?$"):
+        sent(method, include="stds")
+    with pytest.raises(TypeError, match=rf"^{method}\(\) has no parameter 'stds'; did you mean 'std'\?$"):
+        sent(method, stds=True)
 
 
 @pytest.mark.parametrize("include", QUANTITIES, ids=repr)
