@@ -1,12 +1,12 @@
 //! Kinds of models, as metrics count them.
 
-use strum::{EnumMessage, IntoStaticStr, VariantArray};
+use strum::{IntoStaticStr, VariantArray};
 
 use super::Model;
 use crate::regression::solver::Method;
 
 /// A kind of [`Model`]: its solver, and what it serves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, EnumMessage, VariantArray)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, VariantArray)]
 pub enum ModelKind {
     /// A factorization of the whole matrix.
     Dense,
@@ -22,7 +22,7 @@ pub enum ModelKind {
     LocalSurface,
 }
 
-/// What a model serves.
+/// The purposes of a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, IntoStaticStr)]
 #[strum(serialize_all = "snake_case")]
 pub enum Serves {

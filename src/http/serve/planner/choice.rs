@@ -34,7 +34,7 @@ impl Restricted {
         Problem::of_field(catalogue::UNSUPPORTED_BY_SOLVER, self.pointer, detail)
     }
 
-    /// What to do where `auto` would take this solver.
+    /// The remedy where `auto` would take this solver.
     pub(super) fn remedy(self, solver: SolverKind) -> String {
         let solver: &str = solver.into();
         format!("leave out {}, which the {solver} solver cannot compute, or thin the cloud", self.name)
