@@ -104,7 +104,7 @@ impl PreparedFit {
 /// Labels `kind` and `of` of a model in the metrics. A model that was read from the store has no kind.
 pub fn labels(kind: Option<ModelKind>) -> [&'static str; 2] {
     match kind {
-        Some(kind) => [kind.solver(), kind.serves().into()],
+        Some(kind) => [kind.into(), kind.serves().into()],
         None => ["restored", Serves::Both.into()],
     }
 }

@@ -5,8 +5,9 @@ use strum::{IntoStaticStr, VariantArray};
 use super::Model;
 use crate::regression::solver::Method;
 
-/// A kind of [`Model`]: its solver, and what it serves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, VariantArray)]
+/// A kind of [`Model`]. Its name is that of its solver: both local kinds have the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "snake_case")]
 pub enum ModelKind {
     /// A factorization of the whole matrix.
     Dense,
@@ -17,8 +18,10 @@ pub enum ModelKind {
     /// Conjugate gradients.
     Iterative,
     /// Local kriging of values.
+    #[strum(serialize = "local")]
     LocalValues,
     /// Local regressions of a surface.
+    #[strum(serialize = "local")]
     LocalSurface,
 }
 
@@ -32,17 +35,6 @@ pub enum Serves {
 }
 
 impl ModelKind {
-    /// The name of its solver. Both local kinds have that of the local solver.
-    pub const fn solver(self) -> &'static str {
-        match self {
-            Self::Dense => "dense",
-            Self::Pivoted => "pivoted",
-            Self::Landmark => "landmark",
-            Self::Iterative => "iterative",
-            Self::LocalValues | Self::LocalSurface => "local",
-        }
-    }
-
     /// A system of all points serves values and the signature function of a surface.
     pub const fn serves(self) -> Serves {
         match self {

@@ -88,7 +88,7 @@ request! {
         pub quantiles: Option<Vec<f64>>,
         /// The threshold of `exceedance_probabilities`, unit of the values.
         pub threshold: Option<f64>,
-        /// What samples, quantiles and probabilities of exceedance are of. Default: `function`.
+        /// The random quantity of samples, quantiles and probabilities of exceedance. Default: `function`.
         ///
         /// `observation` needs `alpha`: with `noise_variances` the noise at queries is unknown.
         pub of: Option<PosteriorOf>,
