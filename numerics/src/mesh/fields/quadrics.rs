@@ -46,7 +46,8 @@ pub struct Blend {
     pub height: f64,
     /// Gradient of the height without that of the weights.
     pub gradient: Vector,
-    /// Length of the mean of the normals, at most 1. 0 where no quadric is known.
+    /// Length of the mean of the unit normals that the quadrics have at the place, at most 1. On a smooth
+    /// surface it is near 1 however much the normals of the points differ. 0 where no quadric is known.
     pub agreement: f64,
     /// Distance from the foot of the place to the mean of the points, L.
     pub off: f64,
@@ -82,9 +83,11 @@ impl Quadrics {
             let weight = wendland(squared_length(&delta), farthest);
             let bend = quadric.bend(&delta);
             height += weight * (quadric.height + dot(&quadric.normal, &delta) + 0.5 * dot(&bend, &delta));
+            let slope: Vector = std::array::from_fn(|axis| quadric.normal[axis] + bend[axis]);
+            let per_length = squared_length(&slope).sqrt().recip();
             for axis in 0..3 {
-                gradient[axis] += weight * (quadric.normal[axis] + bend[axis]);
-                normal[axis] += weight * quadric.normal[axis];
+                gradient[axis] += weight * slope[axis];
+                normal[axis] += weight * per_length * slope[axis];
                 mean[axis] -= weight * delta[axis];
             }
             total += weight;
