@@ -22,12 +22,12 @@ use gramian::http::fields::limits::{Limits, unobserved};
 use gramian::http::problem::Problem;
 use gramian::http::state::app::App;
 use gramian_host::memory::Owner;
-use gramian_host::wire::negotiation::{Coding, Format, Wanted};
+use gramian_host::wire::negotiation::{AnswerEncoding, Coding, Format};
 use gramian_host::wire::read::parse::parse_json;
 use gramian_host::wire::read::points::Points;
 use gramian_host::wire::write::answer::{Answer, Member, Parts};
 use gramian_host::wire::write::array::Array;
-use gramian_host::wire::write::encode::Encoded;
+use gramian_host::wire::write::encode::EncodedAnswer;
 use support::random;
 
 const N_POINTS: usize = 1_000_000;
@@ -136,10 +136,10 @@ fn service(matrix: Vec<f64>) -> SocketAddr {
     let handler = move || {
         let (app, matrix) = (app.clone(), ready.lock().unwrap().pop().unwrap());
         async move {
-            let wanted = Wanted { format: Format::Npy, coding: Coding::Identity };
+            let wanted = AnswerEncoding { format: Format::Npy, coding: Coding::Identity };
             let memory =
                 app.prepared.reserve(Owner(0), 2 * size_of_val(&*matrix), || true).await.unwrap().unwrap();
-            let encode = move || Encoded::of(Box::new(Matrix(matrix)), wanted);
+            let encode = move || EncodedAnswer::of(Box::new(Matrix(matrix)), wanted);
             let encoded = app.compute.run_small(Owner(0), encode).await;
             encoded.ok().unwrap().ok().unwrap().into_response(&app.compute, memory)
         }

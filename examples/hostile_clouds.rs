@@ -50,7 +50,7 @@ struct Server {
 
 /// Time and status of an answer.
 #[derive(Clone, Copy)]
-struct Timed {
+struct TimedAnswer {
     milliseconds: f64,
     status: u16,
 }
@@ -64,23 +64,23 @@ impl Server {
         Self { url, client: reqwest::Client::new() }
     }
 
-    async fn post(&self, path: &str, body: &Value) -> (Timed, Value) {
+    async fn post(&self, path: &str, body: &Value) -> (TimedAnswer, Value) {
         let request = self.client.post(format!("{}{path}", self.url)).json(body);
         let start = Instant::now();
         let answer = request.send().await.expect("an answer");
         let status = answer.status().as_u16();
         let bytes = answer.bytes().await.expect("all of it");
         let milliseconds = 1e3 * start.elapsed().as_secs_f64();
-        (Timed { milliseconds, status }, serde_json::from_slice(&bytes).expect("JSON"))
+        (TimedAnswer { milliseconds, status }, serde_json::from_slice(&bytes).expect("JSON"))
     }
 
     /// Returns the least times of three for registering a cloud and for each request. Above
     /// [`MAX_DIMENSION`], the cloud is registered once and no requests follow.
-    async fn time(&self, hostile: &Hostile, n_points: usize) -> Vec<Timed> {
+    async fn time(&self, hostile: &Hostile, n_points: usize) -> Vec<TimedAnswer> {
         let cloud = hostile.cloud(n_points);
         let points: Vec<&[f64]> = cloud.points().collect();
         let values: Vec<f64> = (0..n_points).map(|i| (i as f64 * 1e-3).sin()).collect();
-        let mut best: Vec<Timed> = Vec::new();
+        let mut best: Vec<TimedAnswer> = Vec::new();
         let n_times = if hostile.dimension > MAX_DIMENSION { 1 } else { 3 };
         for _ in 0..n_times {
             let (registered, answer) = self.post("/v1/clouds", &json!({"points": points})).await;
@@ -100,7 +100,7 @@ impl Server {
             if best.is_empty() {
                 best = times;
             } else {
-                let least = |(best, time): (&mut Timed, Timed)| {
+                let least = |(best, time): (&mut TimedAnswer, TimedAnswer)| {
                     best.milliseconds = best.milliseconds.min(time.milliseconds);
                 };
                 best.iter_mut().zip(times).for_each(least);
@@ -114,7 +114,7 @@ impl Server {
 async fn main() {
     let Flags { n_points, named, config } = Flags::parse();
     let server = Server::start(config).await;
-    let mut random: Vec<(usize, Vec<Timed>)> = Vec::new();
+    let mut random: Vec<(usize, Vec<TimedAnswer>)> = Vec::new();
     println!("| {n_points} points | d | register, ms | over random | normals | interpolation |");
     println!("|---|---|---|---|---|---|");
     for hostile in HOSTILE.iter().filter(|hostile| hostile.name.contains(&named)) {

@@ -62,10 +62,10 @@ function all(selector) {
 const AT_ONCE = 3000;
 
 /** Settings of what is drawn beside points and meshes. */
-const EXTRAS = ["arrows", "directions", "section", "sectionAt"];
+const OVERLAY_SETTINGS = ["arrows", "directions", "section", "sectionAt"];
 
 /** Settings that change the request. All others change the picture alone. */
-const ASKED = [
+const REQUEST_SETTINGS = [
   "operation",
   "std",
   "quality",
@@ -106,17 +106,17 @@ function begin() {
 // Settings.
 
 /**
- * Applies some settings, and shows what follows.
+ * Applies settings that have changed, and shows what follows.
  *
- * @param {Partial<Settings>} some
+ * @param {Partial<Settings>} changed
  */
-function change(some, { isPush = false } = {}) {
-  Object.assign(page.settings, some);
+function change(changed, { isPush = false } = {}) {
+  Object.assign(page.settings, changed);
   fillForm();
   keepInLink(isPush);
-  if ("example" in some) return loadExample();
-  if (Object.keys(some).some((name) => ASKED.includes(name))) return ask();
-  return showPicture(some);
+  if ("example" in changed) return loadExample();
+  if (Object.keys(changed).some((name) => REQUEST_SETTINGS.includes(name))) return ask();
+  return showPicture(changed);
 }
 
 /** Keeps the settings in the link, at most every third of a second: browsers refuse more. */
@@ -147,7 +147,7 @@ form.addEventListener("input", (event) => {
   const kind = typeof DEFAULTS[name];
   const given = type === "checkbox" ? checked : kind === "number" ? Number(value) : value;
   // Slow answers wait for the end of a movement.
-  if (ASKED.includes(name) && type === "range" && !isSmall()) return;
+  if (REQUEST_SETTINGS.includes(name) && type === "range" && !isSmall()) return;
   const isEnd = name === "low" || name === "high";
   if (isEnd && value === "") return;
   const { low, high } = isEnd ? rangeNow(chosen()) : {};
@@ -310,7 +310,7 @@ window.addEventListener("paste", (event) => {
   if (text) loadOwn(() => read(new TextEncoder().encode(text), "pasted"));
 });
 
-// Questions.
+// Requests.
 
 /** Asks the service. A later question ends an earlier one. */
 async function ask() {
@@ -445,8 +445,8 @@ function rangeNow(quantity) {
   return { low, high, full, hide, isSigned: quantity?.isSigned ?? false, hasLines: settings.isolines };
 }
 
-/** @param {Partial<Settings>} some */
-function showPicture(some = {}) {
+/** @param {Partial<Settings>} changed */
+function showPicture(changed = {}) {
   const { settings, answer, cloud } = page;
   if (!answer || !cloud) return;
   const quantity = chosen();
@@ -463,8 +463,8 @@ function showPicture(some = {}) {
   at("title").textContent = quantity ? `${quantity.title}${quantity.unit ? `, ${quantity.unit}` : ""}` : "Points";
   histogram.show(quantity, range);
   at("summary").textContent = summaryOf({ answer, cloud, quantity, range, reasons: page.reasons });
-  if ("orthographic" in some) scene.project(settings.orthographic);
-  if (EXTRAS.some((name) => name in some)) showExtras();
+  if ("orthographic" in changed) scene.project(settings.orthographic);
+  if (OVERLAY_SETTINGS.some((name) => name in changed)) showExtras();
 }
 
 /** @param {string[]} support */

@@ -18,16 +18,16 @@ mod jet;
 #[path = "../tests/values/posterior.rs"]
 mod posterior;
 
-use features::{Bands, Feature, Measured};
+use features::{Bands, Feature, MeasuredField};
 use gramian_numerics::regression::selection::Criterion;
 use posterior::By;
 use rayon::prelude::*;
 
-fn rows() -> Vec<Measured> {
+fn rows() -> Vec<MeasuredField> {
     let mut rows = Vec::new();
     let mut add = |feature, sizes: &[usize], noises: &[f64]| {
         for &n_points in sizes {
-            rows.extend(noises.iter().map(|&noise| Measured { feature, n_points, noise }));
+            rows.extend(noises.iter().map(|&noise| MeasuredField { feature, n_points, noise }));
         }
     };
     for width in [0.02, 0.03, 0.05, 0.1] {
@@ -63,8 +63,8 @@ fn main() {
     let n_seeds = arguments.first().and_then(|n| n.parse().ok()).unwrap_or(10);
     let only = arguments.get(1).map_or("", String::as_str);
     let is_compared = arguments.get(2).is_some_and(|word| word == "full");
-    let name = |row: &Measured| format!("{:?}", row.feature);
-    let rows: Vec<Measured> = rows().into_iter().filter(|row| name(row).contains(only)).collect();
+    let name = |row: &MeasuredField| format!("{:?}", row.feature);
+    let rows: Vec<MeasuredField> = rows().into_iter().filter(|row| name(row).contains(only)).collect();
     println!("Covered all over, inside; error over the spread.\n");
     println!("| field | n | noise | learned | likelihood of all values |\n|---|---|---|---|---|");
     let found: Vec<(Bands, Option<Bands>)> = rows

@@ -34,12 +34,12 @@ fn main() {
 }
 
 fn print_box(n: usize, noise: f64) {
-    let machined::Answered { covered: [planes, fillets, corners], far_flagged } =
+    let machined::BoxShares { covered: [planes, fillets, corners], far_flagged } =
         rounded_box_answered(n, noise);
     println!("| {n} | {noise} | {planes:.0} % | {fillets:.0} % | {corners:.0} % | {far_flagged:.0} % |");
 }
 
 fn print_sharp(body: Body, noise: f64) {
-    let edges::Answered { flagged, wrong, far_flagged } = body_answered(body, N_OF_SHARP, noise);
+    let edges::BodyShares { flagged, wrong, far_flagged } = body_answered(body, N_OF_SHARP, noise);
     println!("| {body:?} | {noise} | {flagged:.0} % | {wrong:.1} % | {far_flagged:.1} % |");
 }

@@ -21,7 +21,7 @@ mod sweep;
 
 use common::kernels::all_families;
 use fields::FIELDS;
-use flags::{Asked, Counts, Values};
+use flags::{Counts, KernelChoice, Values};
 use rayon::prelude::*;
 use shapes::Shape;
 use sweep::NOISES;
@@ -32,10 +32,10 @@ fn main() {
     let arguments: Vec<usize> = std::env::args().skip(1).filter_map(|n| n.parse().ok()).collect();
     let n_clouds = arguments.first().copied().unwrap_or(2);
     let sizes = if arguments.len() > 1 { arguments[1..].to_vec() } else { vec![300, 1000] };
-    let mut asked = vec![Asked::Nothing];
+    let mut asked = vec![KernelChoice::Nothing];
     for family in all_families().into_iter().filter(|family| !family.has_kink()) {
-        asked.push(Asked::Family(family));
-        asked.extend([0.3, 3.0].map(|factor| Asked::Width(family, factor)));
+        asked.push(KernelChoice::Family(family));
+        asked.extend([0.3, 3.0].map(|factor| KernelChoice::Width(family, factor)));
     }
     println!("Per cent without a flag, and of these off by half: surface gradient; Laplace–Beltrami.\n");
     let of_noises: Vec<String> = NOISES.iter().map(|noise| format!("noise {} %", 100.0 * noise)).collect();

@@ -14,7 +14,7 @@ mod posterior;
 
 use fields::FIELDS;
 use gramian_numerics::regression::selection::Criterion;
-use posterior::{By, Found, Sensors};
+use posterior::{By, DrawSummary, Sensors};
 use rayon::prelude::*;
 
 const SIZES: [usize; 5] = [30, 120, 300, 800, 2000];
@@ -62,20 +62,25 @@ fn main() {
 }
 
 /// Coverage and error of all fields in one, two and three dimensions.
-fn rows((noise, factor, offset): (f64, f64, f64), n_points: usize, by: By, n_draws: usize) -> Vec<Found> {
+fn rows(
+    (noise, factor, offset): (f64, f64, f64),
+    n_points: usize,
+    by: By,
+    n_draws: usize,
+) -> Vec<DrawSummary> {
     let of = |dimension| FIELDS.map(|field| Sensors { dimension, n_points, field, noise, factor, offset });
     let sensors: Vec<Sensors> = [1, 2, 3].into_iter().flat_map(of).collect();
     sensors.par_iter().map(|sensors| sensors.found(by, n_draws)).collect()
 }
 
-fn cell(rows: &[Found], noise: f64) -> String {
+fn cell(rows: &[DrawSummary], noise: f64) -> String {
     let most = if noise > 0.0 { 99.5 } else { 100.0 };
     let n_held = rows.iter().filter(|row| (90.0..=most).contains(&row.coverage)).count();
     let least = rows.iter().map(|row| row.coverage).fold(100.0, f64::min);
     format!("{n_held}, {least:.1} %")
 }
 
-fn median(rows: &[Found]) -> f64 {
+fn median(rows: &[DrawSummary]) -> f64 {
     let mut errors: Vec<f64> = rows.iter().map(|row| row.error).collect();
     errors.sort_by(f64::total_cmp);
     errors[errors.len() / 2]

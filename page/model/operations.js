@@ -69,14 +69,14 @@ const SUBSCRIPTS = ["₁", "₂", "₃"];
  */
 export function quantitiesOf(answer, cloud) {
   /** @type {Quantity[]} */
-  const of = [];
+  const quantities = [];
   const isMesh = "vertices" in answer.tensors;
   const n = isMesh ? answer.tensors.vertices.rows : cloud.points.rows;
   for (const [name, tensor] of Object.entries(answer.tensors)) {
     if (OTHERS.includes(name) || tensor.rows !== n) continue;
     for (let at = 0; at < tensor.width; at++) {
       const index = tensor.width > 1 ? SUBSCRIPTS[at] : "";
-      of.push({
+      quantities.push({
         id: tensor.width > 1 ? `${name}.${at}` : name,
         title: (NAMES[name] ?? name.replaceAll("_", " ")) + index,
         unit: unitOf(name, cloud.points.width),
@@ -88,12 +88,12 @@ export function quantitiesOf(answer, cloud) {
   }
   if (!isMesh) {
     for (const [name, values] of cloud.values) {
-      of.push({ id: `given.${name}`, title: `${name} (given)`, unit: "", isSigned: false, values });
+      quantities.push({ id: `given.${name}`, title: `${name} (given)`, unit: "", isSigned: false, values });
     }
   }
   // Mean curvature first, standard deviations last.
   const rank = ({ id }) => (id === "mean_curvatures" ? 0 : id.endsWith("_std") || id.includes("_std.") ? 2 : 1);
-  return of.sort((a, b) => rank(a) - rank(b));
+  return quantities.sort((a, b) => rank(a) - rank(b));
 }
 
 function columnOf(tensor, at) {

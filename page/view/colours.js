@@ -15,7 +15,7 @@ const STEPS = 4;
 
 export const RESOLUTION = 256;
 
-/** Colours of what a vertex of a mesh rests on. */
+/** Colours of the support of the vertices of a mesh. */
 export const SUPPORT = {
   observed: "#3f7fc4",
   bridged: "#efa55b",

@@ -135,9 +135,9 @@ export class Histogram {
         this.placeOf(this.from + ((bin + side) / BINS) * (this.to - this.from)),
       );
       const middle = this.from + ((bin + 0.5) / BINS) * (this.to - this.from);
-      const tall = this.bins[bin] > 0 ? Math.max(1, Math.sqrt(this.bins[bin] / most) * (base - top)) : 0;
+      const length = this.bins[bin] > 0 ? Math.max(1, Math.sqrt(this.bins[bin] / most) * (base - top)) : 0;
       context.fillStyle = this.colourAt(middle, 0);
-      context.fillRect(left, base - tall, Math.max(1, right - left - 0.5), tall);
+      context.fillRect(left, base - length, Math.max(1, right - left - 0.5), length);
     }
   }
 

@@ -140,7 +140,7 @@ export function showPinned(into, point, { quantities, answer, cloud, reasons }) 
   const position = [...positions.data.subarray(point * d, (point + 1) * d)].map(shown).join(", ");
   const rows = [["position", position]];
   rows.push(...quantities.filter(({ id }) => !id.includes("deviation")).map((of) => [of.title, valueAt(of, point)]));
-  if (answer.fields.support) rows.push(["rests on", answer.fields.support[point]]);
+  if (answer.fields.support) rows.push(["support", answer.fields.support[point]]);
   for (const [reason, { points }] of reasons) if (points.includes(point)) rows.push(["marked", words(reason)]);
   into.replaceChildren(element("strong", { textContent: `Point ${point}` }), list(rows), closing(into));
   into.hidden = false;

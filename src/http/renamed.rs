@@ -5,17 +5,17 @@
 use axum::http::Uri;
 use gramian_host::around::middleware;
 use gramian_host::problem::Problem;
-use gramian_host::wire::read::renamed::Renamed;
+use gramian_host::wire::read::renamed::RenamedWord;
 
 /// Words of requests.
-pub const WORDS: [Renamed; 7] = [
-    Renamed { old: "deviations", new: "std" },
-    Renamed { old: "geometry", new: "surface" },
-    Renamed { old: "surface", new: "surface_model" },
-    Renamed { old: "surface", new: "model" },
-    Renamed { old: "local", new: "regression" },
-    Renamed { old: "variance", new: "variances" },
-    Renamed { old: "observation_variance", new: "observation_variances" },
+pub const WORDS: [RenamedWord; 7] = [
+    RenamedWord { old: "deviations", new: "std" },
+    RenamedWord { old: "geometry", new: "surface" },
+    RenamedWord { old: "surface", new: "surface_model" },
+    RenamedWord { old: "surface", new: "model" },
+    RenamedWord { old: "local", new: "regression" },
+    RenamedWord { old: "variance", new: "variances" },
+    RenamedWord { old: "observation_variance", new: "observation_variances" },
 ];
 
 /// Paths, which stand below `/v1/tiles` now.

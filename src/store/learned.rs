@@ -7,7 +7,7 @@ use gramian_host::memory::Owner;
 use gramian_host::memory::fair_cache::FairCache;
 use gramian_host::memory::single_flight::SingleFlight;
 use gramian_numerics::machine::heap::{arc_payload, block_bytes};
-use gramian_numerics::regression::selection::Learned;
+use gramian_numerics::regression::selection::LearnedModel;
 
 /// Bytes of the whole cache: thousands of entries, and part of the fixed footprint of the process.
 const MAX_BYTES: usize = 1 << 20;
@@ -17,8 +17,8 @@ pub type LearnedKey = (Owner, CloudId, ValuesKey);
 
 /// Recently learned facts by cloud and values. `E` is the error of a computation.
 pub struct LearnedStore<E> {
-    kept: Arc<FairCache<LearnedKey, Arc<Learned>>>,
-    flights: SingleFlight<LearnedKey, Arc<Learned>, E>,
+    kept: Arc<FairCache<LearnedKey, Arc<LearnedModel>>>,
+    flights: SingleFlight<LearnedKey, Arc<LearnedModel>, E>,
 }
 
 impl<E: Clone + Send + Sync + 'static> Default for LearnedStore<E> {
@@ -29,7 +29,7 @@ impl<E: Clone + Send + Sync + 'static> Default for LearnedStore<E> {
 
 impl<E: Clone + Send + Sync + 'static> LearnedStore<E> {
     /// The facts learned from these values, if they are cached.
-    pub fn get(&self, key: LearnedKey) -> Option<Arc<Learned>> {
+    pub fn get(&self, key: LearnedKey) -> Option<Arc<LearnedModel>> {
         self.kept.get(key.0, &key)
     }
 
@@ -41,9 +41,9 @@ impl<E: Clone + Send + Sync + 'static> LearnedStore<E> {
         &self,
         key: LearnedKey,
         compute: impl FnOnce() -> F,
-    ) -> Result<Arc<Learned>, E>
+    ) -> Result<Arc<LearnedModel>, E>
     where
-        F: Future<Output = Result<Learned, E>> + Send + 'static,
+        F: Future<Output = Result<LearnedModel, E>> + Send + 'static,
     {
         if let Some(found) = self.get(key) {
             return Ok(found);
@@ -57,7 +57,7 @@ impl<E: Clone + Send + Sync + 'static> LearnedStore<E> {
                     return Ok(found);
                 }
                 let learned = Arc::new(learning.await?);
-                let n_bytes = block_bytes(arc_payload::<Learned>()) + learned.n_bytes();
+                let n_bytes = block_bytes(arc_payload::<LearnedModel>()) + learned.n_bytes();
                 kept.insert(key.0, key, learned.clone(), n_bytes);
                 Ok(learned)
             }

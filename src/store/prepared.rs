@@ -14,7 +14,7 @@ use gramian_numerics::machine::heap::{arc_payload, block_bytes};
 use gramian_numerics::machine::pages::SpareBuffer;
 use gramian_numerics::model::Model;
 use gramian_numerics::model::kind::{ModelKind, Serves};
-use gramian_numerics::regression::solver::{Known, Solution, Solver};
+use gramian_numerics::regression::solver::{EarlierSolutions, Solution, Solver};
 use gramian_numerics::surface::Surface;
 
 /// Divisor of the cache size that gives the share of weights: they are n numbers beside the n² of a dense
@@ -329,13 +329,13 @@ impl<E: Clone + Send + Sync + 'static> PreparedStore<E> {
     }
 
     /// Returns the cached weights of values that were solved before, or the latest of others.
-    pub fn known(&self, key: FitKey, values: ValuesKey) -> Known {
+    pub fn known(&self, key: FitKey, values: ValuesKey) -> EarlierSolutions {
         let these = self.solutions.get(key.owner, &(key, values)).map(|kept| kept.solution.clone());
         if these.is_some() {
-            return Known { these, earlier: Vec::new() };
+            return EarlierSolutions { these, earlier: Vec::new() };
         }
         let latest = self.solutions.latest(key.owner, EARLIER, |(other, _)| key.is_iterated_like(other));
-        Known { these, earlier: latest.into_iter().map(|kept| kept.solution.clone()).collect() }
+        EarlierSolutions { these, earlier: latest.into_iter().map(|kept| kept.solution.clone()).collect() }
     }
 
     /// Caches weights, if memory for them is free.

@@ -13,7 +13,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::oneshot;
 
 use crate::common::clouds;
-use crate::document::contract::{self, Received};
+use crate::document::contract::{self, AnswerParts};
 
 /// A server in this process, on a free port. Drains when dropped.
 pub struct Server {
@@ -90,7 +90,7 @@ impl Server {
     }
 
     pub async fn send(&self, request: reqwest::RequestBuilder) -> Answer {
-        let Received { status, headers, bytes } = receive(request).await;
+        let AnswerParts { status, headers, bytes } = receive(request).await;
         Answer { status, headers, text: String::from_utf8_lossy(&bytes).into_owned() }
     }
 
@@ -104,7 +104,7 @@ impl Server {
 
     /// Posts a body that begins and never ends. `head` holds further lines of the head, and `body` the bytes
     /// that are sent. Returns the answer, read until the server closes the connection.
-    pub async fn post_stalled(&self, path: &str, head: &str, body: &str) -> Received {
+    pub async fn post_stalled(&self, path: &str, head: &str, body: &str) -> AnswerParts {
         let mut stream = TcpStream::connect(self.address).await.unwrap();
         let request = format!(
             "POST {path} HTTP/1.1\r\nHost: test\r\nConnection: close\r\nContent-Type: application/json\r\n{head}\r\n\r\n{body}"
@@ -112,7 +112,7 @@ impl Server {
         stream.write_all(request.as_bytes()).await.unwrap();
         let mut answer = String::new();
         stream.read_to_string(&mut answer).await.unwrap();
-        let answer = Received::parse(&answer);
+        let answer = AnswerParts::parse(&answer);
         contract::check("POST", path, &answer);
         answer
     }
@@ -151,13 +151,13 @@ pub async fn pause() {
 }
 
 /// Sends a request, reads its answer to the end, and checks it against the OpenAPI document.
-pub async fn receive(request: reqwest::RequestBuilder) -> Received {
+pub async fn receive(request: reqwest::RequestBuilder) -> AnswerParts {
     let (client, request) = request.build_split();
     let request = request.unwrap();
     let (method, path) = (request.method().to_string(), request.url().path().to_owned());
     let response = client.execute(request).await.unwrap();
     let (status, headers) = (response.status().as_u16(), response.headers().clone());
-    let received = Received { status, headers, bytes: response.bytes().await.unwrap().to_vec() };
+    let received = AnswerParts { status, headers, bytes: response.bytes().await.unwrap().to_vec() };
     contract::check(&method, &path, &received);
     received
 }

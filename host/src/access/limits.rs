@@ -28,7 +28,7 @@ pub(super) struct Limits {
 }
 
 /// A request in progress. It counts as concurrent until this is dropped, when its answer has been sent.
-pub struct Entered(Option<OwnedSemaphorePermit>);
+pub struct ConcurrencyPermit(Option<OwnedSemaphorePermit>);
 
 /// A limit that was reached, and when to retry.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -47,7 +47,7 @@ impl Limits {
         Self { rule, rate, under_way }
     }
 
-    pub(super) fn enter(&self) -> Result<Entered, TooMany> {
+    pub(super) fn enter(&self) -> Result<ConcurrencyPermit, TooMany> {
         let permit = self.under_way.as_ref().map(|under_way| under_way.clone().try_acquire_owned());
         let permit = permit.transpose().map_err(|_| {
             let n = self.rule.concurrent_requests.map_or(0, NonZeroU32::get);
@@ -61,11 +61,11 @@ impl Limits {
                 TooMany { limit: format!("{n} requests a minute"), retry_after_seconds }
             })?;
         }
-        Ok(Entered(permit))
+        Ok(ConcurrencyPermit(permit))
     }
 }
 
-impl Drop for Entered {
+impl Drop for ConcurrencyPermit {
     /// Releases the permit.
     fn drop(&mut self) {
         self.0.take();

@@ -26,7 +26,7 @@ use crate::store::OwnerName;
 pub use file::generate;
 use file::{KeyEntry, KeysFile};
 use limits::Limits;
-pub use limits::{Entered, TooMany};
+pub use limits::{ConcurrencyPermit, TooMany};
 
 /// Parses the text of a file of keys and returns the number of keys.
 ///
@@ -67,7 +67,7 @@ impl Caller {
     ///
     /// # Errors
     /// [`TooMany`] beyond the rate or the concurrency of this key.
-    pub fn enter(&self) -> Result<Entered, TooMany> {
+    pub fn enter(&self) -> Result<ConcurrencyPermit, TooMany> {
         self.limits.enter()
     }
 

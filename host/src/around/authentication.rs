@@ -9,7 +9,7 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use http_body_util::BodyExt;
 
-use crate::access::Entered;
+use crate::access::ConcurrencyPermit;
 use crate::memory::Owner;
 use crate::problem::Problem;
 use crate::problem::catalogue;
@@ -44,7 +44,7 @@ pub async fn authenticate(State(host): State<Arc<Host>>, mut request: Request, n
 }
 
 /// Counts the request as in progress until the answer is sent or dropped. Streams of events may take hours.
-fn until_sent(answer: Response, entered: Entered) -> Response {
+fn until_sent(answer: Response, entered: ConcurrencyPermit) -> Response {
     answer.map(|body| {
         Body::new(body.map_err(move |error| {
             // The closure lives as long as the body. Bytes and length of the body are unchanged.

@@ -18,7 +18,7 @@ use crate::memory::CacheOutcome;
 use crate::problem::Problem;
 use crate::problem::catalogue;
 use crate::state::host::{Host, Subject};
-use crate::wire::negotiation::{Format, Wanted};
+use crate::wire::negotiation::{AnswerEncoding, Format};
 
 /// Most bytes of a method and of a path that are logged, because clients may send any number.
 const LOGGED_METHOD_BYTES: usize = 32;
@@ -156,8 +156,8 @@ pub fn with_problem_document(response: Response, request_id: &str) -> Response {
     }
     let problem = match response.extensions().get::<Problem>() {
         Some(problem) => problem.clone(),
-        None => match response.extensions().get::<Documented>() {
-            Some(Documented(document)) => return written_before(status, document, request_id),
+        None => match response.extensions().get::<StoredProblem>() {
+            Some(StoredProblem(document)) => return written_before(status, document, request_id),
             None => foreign(status),
         },
     };
@@ -172,7 +172,7 @@ pub fn with_problem_document(response: Response, request_id: &str) -> Response {
 
 /// A complete problem document. An extension of its answer.
 #[derive(Clone)]
-pub struct Documented(pub serde_json::Value);
+pub struct StoredProblem(pub serde_json::Value);
 
 /// Returns a stored problem document with the id of the current request.
 fn written_before(status: StatusCode, document: &serde_json::Value, request_id: &str) -> Response {
@@ -219,7 +219,7 @@ pub async fn negotiate(request: Request, next: Next) -> Response {
     if matches!(*request.method(), Method::HEAD | Method::DELETE) {
         return next.run(request).await;
     }
-    match Wanted::of(request.headers(), &[Format::Json]) {
+    match AnswerEncoding::of(request.headers(), &[Format::Json]) {
         Ok(_) => next.run(request).await,
         Err(problem) => problem.into_response(),
     }

@@ -81,11 +81,11 @@ enum Size {
 /// What was learned, per owner and size of work.
 pub(super) struct Calibration {
     n_threads: usize,
-    learned: HashMap<(Owner, Size), Learned>,
+    learned: HashMap<(Owner, Size), Speeds>,
 }
 
 /// Locations of ln(measured / nominal) of one owner: of all samples, and of each class.
-struct Learned {
+struct Speeds {
     speed: f64,
     classes: HashMap<(&'static str, bool), Vec<(i32, f64)>>,
 }
@@ -101,7 +101,7 @@ impl Calibration {
         let sample = (seconds / work.nominal_seconds()).ln();
         let speed = self.shared_speed(work.size());
         let learned = self.learned.entry((owner, work.size()));
-        learned.or_insert_with(|| Learned { speed, classes: HashMap::new() }).learn(work, sample);
+        learned.or_insert_with(|| Speeds { speed, classes: HashMap::new() }).learn(work, sample);
     }
 
     /// Predicts the seconds that a request of an owner takes once its turn has come.
@@ -127,7 +127,7 @@ impl Calibration {
     }
 }
 
-impl Learned {
+impl Speeds {
     fn learn(&mut self, work: Work, sample: f64) {
         let prior = self.location(work);
         let decades = self.classes.entry((work.operation, work.is_cached)).or_default();

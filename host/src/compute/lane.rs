@@ -86,11 +86,11 @@ impl Lane {
         receiver.await.ok()?.ok()
     }
 
-    /// Whether the threads have made progress within `patience`.
+    /// Whether the threads have made progress within `timeout`.
     ///
     /// Progress is a job that reached a checkpoint, or a probe that ran. This function sends a probe unless
     /// another is pending, and waits [`PROBE_WAIT`] for it.
-    pub(super) async fn is_moving(&self, patience: Duration) -> bool {
+    pub(super) async fn is_moving(&self, timeout: Duration) -> bool {
         if !self.pulse.is_probed.swap(true, Ordering::Relaxed) {
             let (pulse, (sender, receiver)) = (self.pulse.clone(), oneshot::channel::<()>());
             // An idle lane gives no sign of life, so its silence is measured from here.
@@ -105,7 +105,7 @@ impl Lane {
                 return true;
             }
         }
-        self.pulse.silence() <= patience
+        self.pulse.silence() <= timeout
     }
 }
 

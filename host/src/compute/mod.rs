@@ -56,7 +56,7 @@ const EXCLUSIVE_FLOPS: f64 = 1e10;
 pub const FLOPS_PER_PARSED_BYTE: f64 = 20.0;
 
 /// Longest silence of a healthy lane. The checkpoints of the largest factorization are a second or two apart.
-const PATIENCE: Duration = Duration::from_secs(20);
+const STALL_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// Current load of the compute threads.
 pub struct Load {
@@ -149,9 +149,9 @@ impl Compute {
     pub async fn check_ready(&self) -> Result<(), Problem> {
         self.places.look_for_any().map_err(Problem::overloaded)?;
         for (_, lane) in self.lanes() {
-            if !lane.is_moving(PATIENCE).await {
+            if !lane.is_moving(STALL_TIMEOUT).await {
                 tracing::error!("the threads of a lane do not move");
-                return Err(Problem::overloaded(PATIENCE.as_secs()));
+                return Err(Problem::overloaded(STALL_TIMEOUT.as_secs()));
             }
         }
         Ok(())

@@ -17,13 +17,13 @@ pub(super) struct Places {
 }
 
 struct State {
-    admitted: HashMap<u64, Admitted>,
+    admitted: HashMap<u64, AdmittedRequest>,
     by_owner: HashMap<Owner, usize>,
     n_admissions: u64,
     calibration: Calibration,
 }
 
-struct Admitted {
+struct AdmittedRequest {
     owner: Owner,
     since: Instant,
     /// Cost and expected seconds. `None` until the request is planned.
@@ -69,7 +69,7 @@ impl Places {
         state.n_admissions += 1;
         *state.by_owner.entry(owner).or_default() += 1;
         let admitted =
-            Admitted { owner, since: Instant::now(), work: None, begun: None, worked: Duration::ZERO };
+            AdmittedRequest { owner, since: Instant::now(), work: None, begun: None, worked: Duration::ZERO };
         state.admitted.insert(id, admitted);
         Ok(Admission { places: self.clone(), id, owner, progress: Progress::of_this_task() })
     }
@@ -180,7 +180,9 @@ impl Admission {
     pub fn finish(&self) {
         let mut state = self.places.state();
         let admitted = state.admitted.get(&self.id);
-        let Some(Admitted { work: Some((work, _)), begun: Some(_), worked, .. }) = admitted else { return };
+        let Some(AdmittedRequest { work: Some((work, _)), begun: Some(_), worked, .. }) = admitted else {
+            return;
+        };
         let (work, seconds) = (*work, worked.as_secs_f64());
         state.calibration.learn(self.owner, work, seconds);
     }

@@ -8,7 +8,7 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
 
-use super::idempotency::{Known, fingerprint, key_of, known};
+use super::idempotency::{KeyState, fingerprint, key_of, known};
 use super::look::{JobView, view_of_here};
 use super::{Runner, kept_headers};
 use crate::around::trace::TraceParent;
@@ -70,7 +70,7 @@ pub(super) async fn accept(runner: Runner, request: Request) -> Result<Response,
     let kept = kept_headers(&parts.headers, KEPT_HEADERS.iter().chain(subject));
     let trace = parts.extensions.get::<TraceParent>().map(|parent| (TRACE.to_owned(), parent.to_string()));
     let request = JobRequest { path, headers: kept.chain(trace).collect() };
-    let asked = Asked { owner, request, body: bytes.into() };
+    let asked = JobSubmission { owner, request, body: bytes.into() };
     let Some(key) = key else {
         let entered = asked.write(&runner).await?;
         return Ok(accepted(&entered.begin()?));
@@ -95,13 +95,13 @@ fn accepted(view: &JobView) -> Response {
 }
 
 /// A request that is to become a job.
-struct Asked {
+struct JobSubmission {
     owner: Owner,
     request: JobRequest,
     body: Bytes,
 }
 
-impl Asked {
+impl JobSubmission {
     /// Returns the job of a key: the one that claims it already, or a new one.
     async fn with_key(&self, runner: &Runner, key: &KeyHash) -> Result<JobView, Problem> {
         let mut written = None;
@@ -122,13 +122,13 @@ impl Asked {
         &self,
         runner: &'a Runner,
         key: &KeyHash,
-        written: &mut Option<Entered<'a>>,
+        written: &mut Option<RegistrationGuard<'a>>,
     ) -> Result<Option<JobView>, Problem> {
         let fingerprint = fingerprint(&self.request, &KEPT_HEADERS, &self.body).await;
         for _ in 0..ATTEMPTS {
             let register = match known(&runner.host, self.owner, key, &fingerprint).await? {
-                Known::Job(view) => return Ok(Some(*view)),
-                Known::Free(register) => register,
+                KeyState::Job(view) => return Ok(Some(*view)),
+                KeyState::Free(register) => register,
             };
             let entered = match written.take() {
                 Some(entered) => entered,
@@ -141,12 +141,12 @@ impl Asked {
         Err(Problem::unavailable("jobs with Idempotency-Keys are created too quickly", SECONDS_UNTIL_COUNTED))
     }
 
-    /// Writes the job. It waits until [`Entered::begin`].
-    async fn write<'a>(&self, runner: &'a Runner) -> Result<Entered<'a>, Problem> {
+    /// Writes the job. It waits until [`RegistrationGuard::begin`].
+    async fn write<'a>(&self, runner: &'a Runner) -> Result<RegistrationGuard<'a>, Problem> {
         let (host, owner, id) = (&runner.host, self.owner, JobId::new());
-        let Some(here) = host.jobs.add(id, owner, None) else { return Err(host.compute.out_of_memory()) };
+        let Some(local) = host.jobs.add(id, owner, None) else { return Err(host.compute.out_of_memory()) };
         // On failure the guard takes the job out of this process.
-        let entered = Entered { runner, here: Some(here) };
+        let entered = RegistrationGuard { runner, local: Some(local) };
         host.jobs.kept.add(id, owner)?;
         let Some(mut room) = host.jobs.room(owner, self.body.len()) else {
             let reason = "the stored jobs leave no room for this request";
@@ -162,44 +162,44 @@ impl Asked {
 }
 
 /// A guard that takes a job out of this process, unless it is begun.
-struct Entered<'a> {
+struct RegistrationGuard<'a> {
     runner: &'a Runner,
-    here: Option<Arc<LocalJob>>,
+    local: Option<Arc<LocalJob>>,
 }
 
-impl Entered<'_> {
+impl RegistrationGuard<'_> {
     /// Claims a key for the job. Returns false if the register was changed meanwhile.
     async fn claim(&self, register: Register, key: &KeyHash, fingerprint: &str) -> Result<bool, Problem> {
-        let Some(here) = &self.here else { return Err(Problem::internal()) };
+        let Some(local) = &self.local else { return Err(Problem::internal()) };
         let host = &self.runner.host;
-        let claim = Claim::new(key.clone(), here.id, fingerprint.to_owned());
-        let claimed = host.jobs.objects.claim_key(&host.keys.name_of(here.owner), register, claim).await;
+        let claim = Claim::new(key.clone(), local.id, fingerprint.to_owned());
+        let claimed = host.jobs.objects.claim_key(&host.keys.name_of(local.owner), register, claim).await;
         claimed.map_err(|error| unavailable(&error))
     }
 
     /// Begins the job.
     fn begin(mut self) -> Result<JobView, Problem> {
-        let Some(here) = self.here.take() else { return Err(Problem::internal()) };
-        let view = view_of_here(&here);
-        tokio::spawn(self.runner.clone().run(here));
+        let Some(local) = self.local.take() else { return Err(Problem::internal()) };
+        let view = view_of_here(&local);
+        tokio::spawn(self.runner.clone().run(local));
         Ok(view)
     }
 
     /// Deletes the job. One that the store keeps all the same is begun by a later round, without a claim.
     async fn withdraw(self) {
-        let Some(here) = &self.here else { return };
+        let Some(local) = &self.local else { return };
         let host = &self.runner.host;
-        if let Err(error) = host.jobs.forget(&host.keys.name_of(here.owner), here.id).await {
-            tracing::warn!(job = %here.id, %error, "a job without a claim could not be deleted");
+        if let Err(error) = host.jobs.forget(&host.keys.name_of(local.owner), local.id).await {
+            tracing::warn!(job = %local.id, %error, "a job without a claim could not be deleted");
         }
     }
 }
 
-impl Drop for Entered<'_> {
+impl Drop for RegistrationGuard<'_> {
     fn drop(&mut self) {
-        if let Some(here) = self.here.take() {
-            self.runner.host.jobs.kept.remove(here.id);
-            self.runner.host.jobs.remove(&here);
+        if let Some(local) = self.local.take() {
+            self.runner.host.jobs.kept.remove(local.id);
+            self.runner.host.jobs.remove(&local);
         }
     }
 }

@@ -19,7 +19,7 @@ const MAX_KEY_BYTES: usize = 255;
 const PIECE: usize = 1 << 20;
 
 /// The state of a key.
-pub(super) enum Known {
+pub(super) enum KeyState {
     /// The key belongs to this job.
     Job(Box<JobView>),
     /// The key has no job. The next job claims it in this register, as it was read.
@@ -75,12 +75,12 @@ pub(super) async fn known(
     owner: Owner,
     key: &KeyHash,
     fingerprint: &str,
-) -> Result<Known, Problem> {
+) -> Result<KeyState, Problem> {
     let register = host.jobs.objects.register(&host.keys.name_of(owner), key).await;
     let register = register.map_err(|error| unavailable(&error))?;
     let claim = register.claim(key);
     let Some((id, claim)) = claim.and_then(|claim| Some((claim.job()?, claim))) else {
-        return Ok(Known::Free(register));
+        return Ok(KeyState::Free(register));
     };
     match look(host, owner, id).await {
         Ok(_) if claim.fingerprint != fingerprint => {
@@ -88,8 +88,8 @@ pub(super) async fn known(
                 "this Idempotency-Key was sent with another request: send each request with a key of its own";
             Err(Problem::new(catalogue::INVALID_REQUEST, detail))
         }
-        Ok(view) => Ok(Known::Job(Box::new(view))),
-        Err(problem) if problem.slug() == catalogue::UNKNOWN_JOB => Ok(Known::Free(register)),
+        Ok(view) => Ok(KeyState::Job(Box::new(view))),
+        Err(problem) if problem.slug() == catalogue::UNKNOWN_JOB => Ok(KeyState::Free(register)),
         Err(problem) => Err(problem),
     }
 }

@@ -26,7 +26,7 @@ use crate::store::jobs::{Answer, JobId, JobResult, Outcome};
 use crate::store::room::Room;
 use crate::store::testing::choose::{Choose, Odometer};
 use crate::store::testing::random::Random;
-use crate::store::testing::stepped::{Call, Gate, Stepped, Stops};
+use crate::store::testing::stepped::{Call, Gate, SteppedStore, Stops};
 use crate::store::{Objects, OwnerName};
 use crate::testing::host_on;
 
@@ -34,14 +34,14 @@ const OWNER: Owner = Owner(0);
 
 /// A request to one of the processes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Asked {
+enum JobCall {
     Post,
     /// Deletes the job that the last POST that has ended was answered with.
     Delete,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Told {
+enum Reply {
     Accepted(JobId),
     /// The job is unknown from now on, or was cancelled and is known as such.
     Deleted(JobId),
@@ -63,19 +63,19 @@ fn everywhere(_: Call, _: &Name) -> bool {
 /// Processes on one store, and the outcome of each request.
 struct World {
     gate: Arc<Gate>,
-    store: Stepped,
+    store: SteppedStore,
     processes: Vec<Runner>,
     /// All turns of all processes, so that no job begins.
     _turns: Vec<Box<dyn Any>>,
-    under_way: Vec<(Asked, JoinHandle<Told>)>,
-    told: Vec<(Asked, Told)>,
+    under_way: Vec<(JobCall, JoinHandle<Reply>)>,
+    told: Vec<(JobCall, Reply)>,
     /// The last job that a POST was answered with.
     last: Option<JobId>,
 }
 
 impl World {
     async fn new(n_processes: usize, at: fn(Call, &Name) -> bool) -> Self {
-        let (store, gate) = Stepped::new(true, Stops { at, before_answers: false });
+        let (store, gate) = SteppedStore::new(true, Stops { at, before_answers: false });
         let (mut processes, mut turns) = (Vec::new(), Vec::<Box<dyn Any>>::new());
         for _ in 0..n_processes {
             let objects = Arc::new(Objects::over(Arc::new(store.clone()), Name::default()));
@@ -91,12 +91,12 @@ impl World {
         self.processes[0].host.keys.name_of(OWNER)
     }
 
-    fn begin(&mut self, asked: Asked, process: usize) {
+    fn begin(&mut self, asked: JobCall, process: usize) {
         let (runner, last) = (self.processes[process].clone(), self.last);
         let task = tokio::spawn(async move {
             match asked {
-                Asked::Post => post(runner).await,
-                Asked::Delete => delete(runner.host, last).await,
+                JobCall::Post => post(runner).await,
+                JobCall::Delete => delete(runner.host, last).await,
             }
         });
         self.under_way.push((asked, task));
@@ -109,7 +109,7 @@ impl World {
         self.under_way = under_way;
         for (asked, task) in done {
             let told = task.await.unwrap();
-            if let Told::Accepted(id) = told {
+            if let Reply::Accepted(id) = told {
                 self.last = Some(id);
             }
             self.told.push((asked, told));
@@ -117,7 +117,7 @@ impl World {
     }
 
     /// Runs one request without stops.
-    async fn at_once(&mut self, asked: Asked, process: usize) -> Told {
+    async fn at_once(&mut self, asked: JobCall, process: usize) -> Reply {
         self.gate.set_open(true);
         self.begin(asked, process);
         self.settle().await;
@@ -128,7 +128,7 @@ impl World {
 
     /// Begins the requests when the choice says so, and releases one parked call after the other until all
     /// are answered.
-    async fn run(&mut self, choose: &mut impl Choose, asked: &[(Asked, usize)]) {
+    async fn run(&mut self, choose: &mut impl Choose, asked: &[(JobCall, usize)]) {
         let mut rest = asked.iter();
         while !self.under_way.is_empty() || rest.len() > 0 {
             let n_parked = self.gate.n_parked();
@@ -177,17 +177,17 @@ impl World {
         let history = self.told.clone();
         let known = self.known().await;
         assert!(known.len() <= 1, "{known:?} live: {history:#?}");
-        let of = |wanted: fn(&Told) -> Option<JobId>| {
+        let of = |wanted: fn(&Reply) -> Option<JobId>| {
             history.iter().filter_map(|(_, told)| wanted(told)).collect::<HashSet<_>>()
         };
-        let accepted = of(|told| if let Told::Accepted(id) = told { Some(*id) } else { None });
-        let deleted = of(|told| if let Told::Deleted(id) = told { Some(*id) } else { None });
-        assert!(!history.iter().any(|(_, told)| matches!(told, Told::Refused(_))), "{history:#?}");
+        let accepted = of(|told| if let Reply::Accepted(id) = told { Some(*id) } else { None });
+        let deleted = of(|told| if let Reply::Deleted(id) = told { Some(*id) } else { None });
+        assert!(!history.iter().any(|(_, told)| matches!(told, Reply::Refused(_))), "{history:#?}");
         for id in &accepted {
             assert!(deleted.contains(id) || known == [*id], "{id} is lost, {known:?} live: {history:#?}");
         }
         for process in 0..self.processes.len() {
-            let Told::Accepted(found) = self.at_once(Asked::Post, process).await else {
+            let Reply::Accepted(found) = self.at_once(JobCall::Post, process).await else {
                 panic!("{history:#?}")
             };
             if process == 0 && known.is_empty() {
@@ -212,36 +212,36 @@ impl World {
     }
 }
 
-async fn post(runner: Runner) -> Told {
+async fn post(runner: Runner) -> Reply {
     let request = Request::post("/v1/normals").header(IDEMPOTENCY_KEY, "key").extension(OWNER);
     let answer = accept(runner, request.body(Body::from("{}")).unwrap()).await;
     let answer = match answer {
         Ok(answer) => answer,
-        Err(problem) => return Told::Refused(problem.slug()),
+        Err(problem) => return Reply::Refused(problem.slug()),
     };
     let text = body::to_bytes(answer.into_body(), 1 << 20).await.unwrap();
     let view: serde_json::Value = serde_json::from_slice(&text).unwrap();
-    Told::Accepted(JobId::parse(view["job_id"].as_str().unwrap()).unwrap())
+    Reply::Accepted(JobId::parse(view["job_id"].as_str().unwrap()).unwrap())
 }
 
-async fn delete(host: Arc<Host>, id: Option<JobId>) -> Told {
-    let Some(id) = id else { return Told::Unknown };
+async fn delete(host: Arc<Host>, id: Option<JobId>) -> Reply {
+    let Some(id) = id else { return Reply::Unknown };
     match requests::delete(&host, OWNER, id).await {
-        Ok(_) => Told::Deleted(id),
-        Err(problem) if problem.slug() == catalogue::UNKNOWN_JOB => Told::Unknown,
-        Err(problem) => Told::Refused(problem.slug()),
+        Ok(_) => Reply::Deleted(id),
+        Err(problem) if problem.slug() == catalogue::UNKNOWN_JOB => Reply::Unknown,
+        Err(problem) => Reply::Refused(problem.slug()),
     }
 }
 
 /// Runs every interleaving of some requests for a key: without a job, and with one that has ended. Returns
 /// their number.
-async fn exhaust(world: &mut World, asked: &[(Asked, usize)]) -> usize {
+async fn exhaust(world: &mut World, asked: &[(JobCall, usize)]) -> usize {
     let mut n_ways = 0;
     for has_job in [false, true] {
         let mut odometer = Odometer::default();
         loop {
             if has_job {
-                let Told::Accepted(id) = world.at_once(Asked::Post, 0).await else { panic!() };
+                let Reply::Accepted(id) = world.at_once(JobCall::Post, 0).await else { panic!() };
                 world.end(id).await;
             }
             // Nothing is shared before the first stop, so all requests may begin at once.
@@ -262,7 +262,7 @@ async fn exhaust(world: &mut World, asked: &[(Asked, usize)]) -> usize {
 
 #[tokio::test]
 async fn every_interleaving_of_requests_with_one_key_and_a_deletion_leaves_one_job() {
-    use Asked::{Delete, Post};
+    use JobCall::{Delete, Post};
     let mut n_ways = 0;
     for n_processes in [1, 2] {
         let last = n_processes - 1;
@@ -283,7 +283,7 @@ async fn random_requests_with_one_key_leave_one_job() {
             let mut random = Random(seed);
             for _ in 0..3 {
                 let some = |random: &mut Random| {
-                    let asked = if random.below(3) == 0 { Asked::Delete } else { Asked::Post };
+                    let asked = if random.below(3) == 0 { JobCall::Delete } else { JobCall::Post };
                     (asked, random.below(n_processes))
                 };
                 let asked: Vec<_> = (0..4).map(|_| some(&mut random)).collect();

@@ -13,7 +13,7 @@ use futures_util::Stream;
 
 use super::look::{JobView, find_known, look, look_until_ended, problem_of};
 use super::{restore_headers, unknown_job};
-use crate::around::middleware::Documented;
+use crate::around::middleware::StoredProblem;
 use crate::memory::Owner;
 use crate::memory::budget::Reservation;
 use crate::problem::{Problem, catalogue};
@@ -120,8 +120,8 @@ pub async fn result(host: &Host, owner: Owner, id: JobId) -> Result<Response, Pr
     // A waiting client holds its connection as long as a follower does, so it counts as one.
     let waiting = if first.has_ended() { None } else { Some(take_place(host, owner)?) };
     let deadline = host.settings.deadline();
-    let patience = deadline.saturating_sub(MARGIN).max(deadline / 2);
-    let ended = tokio::time::timeout(patience, look_until_ended(host, owner, id)).await;
+    let timeout = deadline.saturating_sub(MARGIN).max(deadline / 2);
+    let ended = tokio::time::timeout(timeout, look_until_ended(host, owner, id)).await;
     let detail = "the job has not ended; request its result again later";
     ended.map_err(|_| Problem::new(catalogue::DEADLINE_EXCEEDED, detail))??;
     drop(waiting);
@@ -141,7 +141,7 @@ pub async fn result(host: &Host, owner: Owner, id: JobId) -> Result<Response, Pr
     if found.head.outcome == Outcome::Failed {
         let status = StatusCode::from_u16(found.head.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
         let document = problem_of(found).await?;
-        return Ok((status, Extension(Documented(document))).into_response());
+        return Ok((status, Extension(StoredProblem(document))).into_response());
     }
     let most = host.jobs.objects.bytes_per_reader();
     let n_bytes = usize::try_from(found.n_body_bytes).unwrap_or(usize::MAX).min(most);

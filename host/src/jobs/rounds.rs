@@ -9,7 +9,7 @@ use std::collections::{HashMap, HashSet};
 use std::time::{Duration, Instant, SystemTime};
 
 use super::Runner;
-use super::run::EXPIRING;
+use super::run::EXPIRES_AFTER;
 use crate::memory::Owner;
 use crate::state::kept::{KeptJob, SECONDS_UNTIL_COUNTED, is_older};
 use crate::store::jobs::{JobId, JobObjects};
@@ -88,7 +88,7 @@ impl Runner {
                     here.cancelled.cancel();
                 }
             } else if jobs.has_turn(owner)
-                && (since.elapsed() >= EXPIRING || self.is_released(&name, &job).await?)
+                && (since.elapsed() >= EXPIRES_AFTER || self.is_released(&name, &job).await?)
             {
                 self.take_up(&job, owner);
             }

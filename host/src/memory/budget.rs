@@ -135,9 +135,9 @@ impl Budget {
         }
     }
 
-    /// Grows a reservation within `patience`. Returns whether it succeeded. It waits while holding bytes that
-    /// others may wait for, so `patience` must be short.
-    pub async fn grow(&self, reservation: &mut Reservation, n_bytes: usize, patience: Duration) -> bool {
+    /// Grows a reservation within `timeout`. Returns whether it succeeded. It waits while holding bytes that
+    /// others may wait for, so `timeout` must be short.
+    pub async fn grow(&self, reservation: &mut Reservation, n_bytes: usize, timeout: Duration) -> bool {
         let growing = async {
             loop {
                 let released = self.ledger.released.notified();
@@ -150,7 +150,7 @@ impl Budget {
                 let _ = tokio::time::timeout(LOOK_AGAIN, released).await;
             }
         };
-        tokio::time::timeout(patience, growing).await.is_ok()
+        tokio::time::timeout(timeout, growing).await.is_ok()
     }
 
     /// Returns the bytes missing for a reservation, its turn aside, or `None` if it fits.

@@ -4,11 +4,11 @@ use axum::response::Response;
 
 use super::{AnswerHeaders, Call};
 use crate::memory::budget::Reservation;
-use crate::wire::write::encode::Encoded;
+use crate::wire::write::encode::EncodedAnswer;
 
 /// An encoded answer with its memory, ready to be sent.
 pub struct Answer {
-    pub encoded: Encoded,
+    pub encoded: EncodedAnswer,
     pub memory: Reservation,
     pub headers: AnswerHeaders,
 }

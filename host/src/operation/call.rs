@@ -7,7 +7,7 @@ use crate::compute::{Admission, JobObserver, Work};
 use crate::problem::{Problem, catalogue};
 use crate::state::host::Host;
 use crate::state::settings::Settings;
-use crate::wire::negotiation::Wanted;
+use crate::wire::negotiation::AnswerEncoding;
 
 /// A call of an operation: its place, the format of its answer, and the time at which parsing began.
 #[derive(Clone)]
@@ -17,7 +17,7 @@ pub struct Call {
     /// Operation id in the OpenAPI document.
     pub operation: &'static str,
     /// `None` for calls that are not answered by the operation.
-    pub wanted: Option<Wanted>,
+    pub wanted: Option<AnswerEncoding>,
     pub began: Instant,
 }
 

@@ -26,7 +26,7 @@ const FIRST_BYTES: usize = 64 << 10;
 const LEAST_BYTES_PER_SECOND: f64 = 16384.0;
 
 /// Time for which a body waits for memory before it is refused, because it holds memory that others wait for.
-const PATIENCE: Duration = Duration::from_secs(1);
+const MEMORY_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// A body with its reserved memory.
 pub struct ReceivedBody {
@@ -95,7 +95,7 @@ pub async fn read_body(
     let body = RequestBody::new(format, coding, bytes, host.guest.shares.body);
     // All memory for parsing is reserved before it begins, as far as it can be foreseen.
     let n_to_parse = body.parsing().n_bytes(body.n_bytes_expected(), &host.guest.lists);
-    if !host.intake.grow(&mut memory, n_to_parse, PATIENCE).await {
+    if !host.intake.grow(&mut memory, n_to_parse, MEMORY_TIMEOUT).await {
         return Err(host.compute.out_of_memory());
     }
     Ok(ReceivedBody { body, memory })
@@ -183,7 +183,7 @@ impl Reader<'_> {
             return Ok(());
         }
         let wanted = (2 * self.bytes.capacity()).max(FIRST_BYTES).min(self.most).max(needed);
-        if !self.host.intake.grow(&mut self.memory, wanted - self.bytes.capacity(), PATIENCE).await {
+        if !self.host.intake.grow(&mut self.memory, wanted - self.bytes.capacity(), MEMORY_TIMEOUT).await {
             return Err(self.host.compute.out_of_memory());
         }
         self.bytes.reserve_exact(wanted - self.bytes.len());

@@ -35,7 +35,7 @@ pub use answer::Answer;
 pub use call::{Call, Outlook};
 pub use headers::AnswerHeaders;
 pub use ready::{Computation, Ready};
-pub use received::{AnyRequest, Parse, REQUEST_FORMATS, Received};
+pub use received::{AnyRequest, Parse, REQUEST_FORMATS, ReceivedRequest};
 pub use simple::{Operation, operation};
 
 /// A step that a request has reached, where something has to be awaited before it goes on.
@@ -70,7 +70,7 @@ pub fn serve(
     operation: AnyOperation,
 ) -> BoxFuture<'static, Result<Response, Problem>> {
     async move {
-        let (call, received) = Received::read(host, owner, request, operation).await?;
+        let (call, received) = ReceivedRequest::read(host, owner, request, operation).await?;
         let mut next = received.parse(&call).await?;
         loop {
             next = match next {

@@ -7,7 +7,7 @@ use crate::compute::{JobObserver, Work};
 use crate::memory::budget::Reservation;
 use crate::problem::Problem;
 use crate::wire::write::answer::Answer as Members;
-use crate::wire::write::encode::Encoded;
+use crate::wire::write::encode::EncodedAnswer;
 
 /// Computes an answer, on the pool.
 pub type Computation = Box<dyn FnOnce(&JobObserver) -> Result<Box<dyn Members>, Problem> + Send>;
@@ -57,7 +57,7 @@ impl Ready {
         drop(intake);
         let times = observer.times();
         let began = Instant::now();
-        let encoded = Encoded::of(answer, wanted)?;
+        let encoded = EncodedAnswer::of(answer, wanted)?;
         headers.computed(times, (!encoded.is_streamed()).then_some(began.elapsed()));
         Ok(Answer { encoded, memory, headers })
     }

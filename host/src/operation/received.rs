@@ -12,7 +12,7 @@ use crate::memory::Owner;
 use crate::memory::budget::Reservation;
 use crate::problem::Problem;
 use crate::state::host::Host;
-use crate::wire::negotiation::{BodyFormat, Wanted};
+use crate::wire::negotiation::{AnswerEncoding, BodyFormat};
 use crate::wire::read::body::UnpackedBody;
 use crate::wire::read::limits::ParseContext;
 
@@ -39,12 +39,12 @@ pub type Parse =
     Box<dyn FnOnce(&UnpackedBody, &ParseContext<'_>) -> Result<Box<dyn AnyRequest>, Problem> + Send>;
 
 /// A request whose body is read, with a place among threads and queue.
-pub struct Received {
+pub struct ReceivedRequest {
     body: ReceivedBody,
     parse: Parse,
 }
 
-impl Received {
+impl ReceivedRequest {
     /// Settles the formats of body and answer, reads the body, and takes a place.
     ///
     /// # Errors
@@ -56,7 +56,7 @@ impl Received {
         operation: AnyOperation,
     ) -> Result<(Call, Self), Problem> {
         let (parts, body) = request.into_parts();
-        let wanted = Some(Wanted::of(&parts.headers, operation.formats)?);
+        let wanted = Some(AnswerEncoding::of(&parts.headers, operation.formats)?);
         let body = read_body(&host, owner, &parts.headers, body, &REQUEST_FORMATS).await?;
         let admission = host.compute.admit(owner)?;
         let AnyOperation { name, parse, .. } = operation;

@@ -44,17 +44,17 @@ pub trait Operation: DeserializeOwned + Send + 'static {
 /// Returns an operation as it is served to one request.
 pub fn operation<O: Operation>(context: O::Context) -> AnyOperation {
     let parse = |body: &UnpackedBody, parsing: &ParseContext<'_>| -> Result<Box<dyn AnyRequest>, Problem> {
-        Ok(Box::new(Parsed { request: body.parse::<O>(parsing)?, context }))
+        Ok(Box::new(ParsedRequest { request: body.parse::<O>(parsing)?, context }))
     };
     AnyOperation { name: O::NAME, formats: O::FORMATS, parse: Box::new(parse) }
 }
 
-struct Parsed<O: Operation> {
+struct ParsedRequest<O: Operation> {
     request: O,
     context: O::Context,
 }
 
-impl<O: Operation> AnyRequest for Parsed<O> {
+impl<O: Operation> AnyRequest for ParsedRequest<O> {
     fn begin(
         self: Box<Self>,
         call: &Call,
@@ -63,7 +63,7 @@ impl<O: Operation> AnyRequest for Parsed<O> {
     ) -> Result<Next, Problem> {
         let price = self.request.plan(&self.context)?;
         let Price { n_bytes, flops } = price;
-        let priced = Priced { parsed: *self, price, intake };
+        let priced = PricedRequest { parsed: *self, price, intake };
         if call.wanted.is_none() || !is_light(flops) {
             return Ok(Next::Step(Box::new(priced)));
         }
@@ -75,16 +75,16 @@ impl<O: Operation> AnyRequest for Parsed<O> {
 }
 
 /// A request whose price is known.
-struct Priced<O: Operation> {
-    parsed: Parsed<O>,
+struct PricedRequest<O: Operation> {
+    parsed: ParsedRequest<O>,
     price: Price,
     /// Memory of the request until its answer is computed.
     intake: Reservation,
 }
 
-impl<O: Operation> Priced<O> {
+impl<O: Operation> PricedRequest<O> {
     fn ready(self, call: &Call, memory: Reservation) -> Ready {
-        let Self { parsed: Parsed { request, context }, price: Price { flops, .. }, intake } = self;
+        let Self { parsed: ParsedRequest { request, context }, price: Price { flops, .. }, intake } = self;
         let work = move |observer: &JobObserver| -> Result<Box<dyn Members>, Problem> {
             Ok(Box::new(request.compute(&context, observer)?))
         };
@@ -93,7 +93,7 @@ impl<O: Operation> Priced<O> {
     }
 }
 
-impl<O: Operation> Step for Priced<O> {
+impl<O: Operation> Step for PricedRequest<O> {
     fn advance<'a>(self: Box<Self>, call: &'a Call) -> BoxFuture<'a, Result<Next, Problem>> {
         async move {
             let Price { n_bytes, flops } = self.price;

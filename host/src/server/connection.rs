@@ -63,7 +63,7 @@ const SOCKET_BUFFER: usize = 256 << 10;
 
 /// Time limits for clients.
 #[derive(Debug, Clone, Copy)]
-pub struct Patience {
+pub struct ConnectionTimeouts {
     /// Time without a request: between two, or until the head of one is complete.
     pub idle: Duration,
     /// Reading of an answer, beyond the time that its bytes take at [`super::pace::LEAST_RATE`].
@@ -81,21 +81,21 @@ pub async fn serve(
     socket: TcpStream,
     tls: Option<Arc<Tls>>,
     router: Router,
-    patience: Patience,
+    timeouts: ConnectionTimeouts,
     activity: Arc<Activity>,
 ) {
     // Both fail if the client has gone already. Set on the listener, the buffer size would miss connections
     // that came before.
     let _ = socket.set_nodelay(true);
     let _ = SockRef::from(&socket).set_send_buffer_size(SOCKET_BUFFER);
-    let Some(socket) = shaken(socket, tls, patience, &activity).await else { return };
+    let Some(socket) = shaken(socket, tls, timeouts, &activity).await else { return };
     let exchanges = activity.clone();
     // The request is under way from here on, before the connection is read any further.
     let service = service_fn(move |request| exchange(request, router.clone(), exchanges.enter()));
     let io = TokioIo::new(Socket::new(socket, activity.clone()));
-    let builder = builder(patience.sending);
+    let builder = builder(timeouts.sending);
     let mut connection = std::pin::pin!(builder.serve_connection(io, service));
-    let mut expired = std::pin::pin!(activity.expired(patience.idle, patience.sending));
+    let mut expired = std::pin::pin!(activity.expired(timeouts.idle, timeouts.sending));
     let expiry = loop {
         tokio::select! {
             outcome = connection.as_mut() => {
@@ -124,7 +124,7 @@ pub async fn serve(
 async fn shaken(
     socket: TcpStream,
     tls: Option<Arc<Tls>>,
-    patience: Patience,
+    timeouts: ConnectionTimeouts,
     activity: &Activity,
 ) -> Option<Wire> {
     let Some(tls) = tls else { return Some(Wire::Plain(socket)) };
@@ -136,7 +136,7 @@ async fn shaken(
                 None
             }
         },
-        _ = activity.expired(patience.idle, patience.sending) => None,
+        _ = activity.expired(timeouts.idle, timeouts.sending) => None,
         _ = activity.notice() => None,
     }
 }

@@ -24,7 +24,7 @@ use tokio::net::TcpListener;
 use crate::jobs::Runner;
 use accept::{Acceptor, Connections, Door};
 use activity::Activity;
-use connection::Patience;
+use connection::ConnectionTimeouts;
 pub use probe::is_ready;
 use tls::Tls;
 pub use tls::install_provider;
@@ -49,7 +49,7 @@ pub async fn serve(
 ) -> io::Result<()> {
     let host = runner.host.clone();
     let config = &host.settings;
-    let patience = Patience { idle: config.idle(), sending: config.sending() };
+    let timeouts = ConnectionTimeouts { idle: config.idle(), sending: config.sending() };
     let tls = match (&config.tls_certificate, &config.tls_key) {
         (Some(certificate), Some(key)) => {
             Some(Arc::new(Tls::new(certificate, key).map_err(io::Error::other)?))
@@ -58,7 +58,7 @@ pub async fn serve(
     };
     let following = tls.clone().map(|tls| tokio::spawn(tls.follow_files()));
     tokio::spawn(runner.go_round());
-    let listening = Listening { router, tls, patience, limit: config.max_connections };
+    let listening = Listening { router, tls, timeouts, limit: config.max_connections };
     let mut connections = listening.until(listener, stop).await;
     tracing::info!(n_connections = connections.len(), "draining");
     host.draining.cancel();
@@ -92,7 +92,7 @@ pub async fn serve(
 struct Listening {
     router: Router,
     tls: Option<Arc<Tls>>,
-    patience: Patience,
+    timeouts: ConnectionTimeouts,
     /// Most connections at once.
     limit: usize,
 }
@@ -117,7 +117,7 @@ impl Listening {
                 Some(socket) if has_room => {
                     let activity = Activity::new();
                     let (tls, router) = (self.tls.clone(), self.router.clone());
-                    let served = connection::serve(socket, tls, router, self.patience, activity.clone());
+                    let served = connection::serve(socket, tls, router, self.timeouts, activity.clone());
                     connections.add(activity, served);
                 }
                 // A plain-text refusal would not be understood by a TLS client.

@@ -36,7 +36,7 @@ struct Count {
 }
 
 /// An answer of `n` pieces, each after a pause.
-struct Watched {
+struct WatchedBody {
     count: Arc<Count>,
     n: usize,
     piece: usize,
@@ -44,14 +44,14 @@ struct Watched {
     pausing: Option<Pin<Box<tokio::time::Sleep>>>,
 }
 
-impl Watched {
+impl WatchedBody {
     fn body(count: &Arc<Count>, n: usize, piece: usize, pause: Duration) -> Body {
         count.made.fetch_add(1, SeqCst);
         Body::new(Self { count: count.clone(), n, piece, pause, pausing: None })
     }
 }
 
-impl HttpBody for Watched {
+impl HttpBody for WatchedBody {
     type Data = Bytes;
     type Error = Infallible;
 
@@ -73,7 +73,7 @@ impl HttpBody for Watched {
     }
 }
 
-impl Drop for Watched {
+impl Drop for WatchedBody {
     fn drop(&mut self) {
         self.count.dropped.fetch_add(1, SeqCst);
     }
@@ -90,12 +90,12 @@ async fn start_with_limit(sending: Duration, limit: usize) -> (SocketAddr, Arc<C
     let none = Duration::ZERO;
     let router = Router::new()
         .route("/ok", get(|| async { "ok" }))
-        .route("/huge", get(async move || Watched::body(&huge, 4096, 64 << 10, none)))
-        .route("/small", get(async move || Watched::body(&small, 1, 1000, none)))
-        .route("/paused", get(async move || Watched::body(&paused, 4, 100, 2 * SENDING)))
-        .route("/whole", get(async move || Watched::body(&whole, 1, 8 << 20, none)));
-    let patience = Patience { idle: Duration::from_secs(30), sending };
-    let listening = Listening { router, tls: None, patience, limit };
+        .route("/huge", get(async move || WatchedBody::body(&huge, 4096, 64 << 10, none)))
+        .route("/small", get(async move || WatchedBody::body(&small, 1, 1000, none)))
+        .route("/paused", get(async move || WatchedBody::body(&paused, 4, 100, 2 * SENDING)))
+        .route("/whole", get(async move || WatchedBody::body(&whole, 1, 8 << 20, none)));
+    let timeouts = ConnectionTimeouts { idle: Duration::from_secs(30), sending };
+    let listening = Listening { router, tls: None, timeouts, limit };
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = listener.local_addr().unwrap();
     tokio::spawn(async move { listening.until(listener, std::future::pending()).await });

@@ -15,7 +15,7 @@ use crate::problem::slug::Slug;
 use crate::problem::{Problem, catalogue};
 use crate::store::Objects;
 use crate::wire::read::limits::{Lists, ParseContext};
-use crate::wire::read::renamed::Renamed;
+use crate::wire::read::renamed::RenamedWord;
 use gramian_observer::Observer;
 
 /// Reason why the host does not start.
@@ -50,7 +50,7 @@ pub struct Guest {
     /// Limits of the lists of its requests.
     pub lists: Lists,
     /// Words of its requests that have another name now.
-    pub renamed: &'static [Renamed],
+    pub renamed: &'static [RenamedWord],
     /// Types of problems that it answers with, those of the host included.
     pub problems: Vec<Slug>,
     /// Header with the id of what a request is about, if the service has such ids. Proxies route by it.

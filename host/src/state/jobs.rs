@@ -7,7 +7,7 @@ use std::time::SystemTime;
 
 use tokio_util::sync::CancellationToken;
 
-use super::kept::Kept;
+use super::kept::KeptJobs;
 use crate::compute::{FairSemaphore, Progress};
 use crate::memory::budget::{Budget, Reservation};
 use crate::memory::{Owner, share_of_one};
@@ -20,10 +20,10 @@ use crate::store::{Objects, OwnerName, Unavailable};
 /// The jobs of this process, and the objects of all jobs.
 pub struct Jobs {
     pub objects: Arc<Objects>,
-    here: Mutex<HashMap<JobId, Arc<LocalJob>>>,
+    local: Mutex<HashMap<JobId, Arc<LocalJob>>>,
     /// Bytes of kept requests and results. Without a store these are bytes of memory.
     pub bytes: Budget,
-    pub kept: Kept,
+    pub kept: KeptJobs,
     pub turns: Arc<FairSemaphore>,
     /// Most jobs that may wait or run in this process, of all owners and of one.
     most: usize,
@@ -73,9 +73,9 @@ impl Jobs {
         let most = n_threads.saturating_add(limits.max_queue);
         Self {
             objects: store.unwrap_or_else(|| Arc::new(Objects::in_memory())),
-            here: Mutex::default(),
+            local: Mutex::default(),
             bytes: Budget::new(limits.n_bytes, n_owners),
-            kept: Kept::new(limits.max_kept, n_owners),
+            kept: KeptJobs::new(limits.max_kept, n_owners),
             turns: FairSemaphore::of_owners(n_threads, n_owners),
             most,
             most_of_owner: share_of_one(most, n_owners),
@@ -85,9 +85,9 @@ impl Jobs {
 
     /// Returns the number of jobs of this process.
     pub fn load(&self) -> Load {
-        let here = self.here();
-        let n_running = here.values().filter(|job| job.is_running()).count();
-        Load { n_waiting: here.len() - n_running, n_running }
+        let local = self.local();
+        let n_running = local.values().filter(|job| job.is_running()).count();
+        Load { n_waiting: local.len() - n_running, n_running }
     }
 
     /// Bytes of jobs in memory.
@@ -110,21 +110,21 @@ impl Jobs {
     /// Resolves once this process has no jobs.
     pub async fn all_left(&self) {
         loop {
-            let Some(job) = self.here().values().next().cloned() else { return };
+            let Some(job) = self.local().values().next().cloned() else { return };
             job.over.cancelled().await;
         }
     }
 
     pub fn find(&self, id: JobId) -> Option<Arc<LocalJob>> {
-        self.here().get(&id).cloned()
+        self.local().get(&id).cloned()
     }
 
     /// Adds a job to this process. `None` if it is already here, or there are too many, of all owners or of
     /// this one.
     pub fn add(&self, id: JobId, owner: Owner, last: Option<(u32, SystemTime)>) -> Option<Arc<LocalJob>> {
-        let mut here = self.here();
-        let n_of_owner = here.values().filter(|job| job.owner == owner).count();
-        if here.len() >= self.most || n_of_owner >= self.most_of_owner || here.contains_key(&id) {
+        let mut local = self.local();
+        let n_of_owner = local.values().filter(|job| job.owner == owner).count();
+        if local.len() >= self.most || n_of_owner >= self.most_of_owner || local.contains_key(&id) {
             return None;
         }
         let job = Arc::new(LocalJob {
@@ -137,20 +137,20 @@ impl Jobs {
             cancelled: CancellationToken::new(),
             over: CancellationToken::new(),
         });
-        here.insert(id, job.clone());
+        local.insert(id, job.clone());
         Some(job)
     }
 
     /// Jobs of an owner that wait for a turn in this process.
     pub fn waiting_of(&self, owner: Owner) -> Vec<JobId> {
-        let here = self.here();
-        let waiting = here.values().filter(|job| job.owner == owner && !job.is_running());
+        let local = self.local();
+        let waiting = local.values().filter(|job| job.owner == owner && !job.is_running());
         waiting.map(|job| job.id).collect()
     }
 
     /// Removes a job from this process.
     pub fn remove(&self, job: &LocalJob) {
-        self.here().remove(&job.id);
+        self.local().remove(&job.id);
         job.over.cancel();
     }
 
@@ -185,8 +185,8 @@ impl Jobs {
         if is_cancelled {
             self.kept.end(id, owner, None);
         }
-        if let Some(here) = self.find(id).filter(|_| is_cancelled) {
-            here.cancelled.cancel();
+        if let Some(local) = self.find(id).filter(|_| is_cancelled) {
+            local.cancelled.cancel();
         }
         Ok(is_cancelled)
     }
@@ -194,7 +194,7 @@ impl Jobs {
     /// Resolves when this process stops working on the job. Never resolves for jobs of other processes.
     pub async fn until_over(&self, id: JobId) {
         match self.find(id) {
-            Some(here) => here.over.cancelled().await,
+            Some(local) => local.over.cancelled().await,
             None => std::future::pending().await,
         }
     }
@@ -210,8 +210,8 @@ impl Jobs {
     }
 
     #[expect(clippy::disallowed_methods, reason = "a table, for as long as it takes to look into it")]
-    fn here(&self) -> MutexGuard<'_, HashMap<JobId, Arc<LocalJob>>> {
-        self.here.lock().unwrap_or_else(PoisonError::into_inner)
+    fn local(&self) -> MutexGuard<'_, HashMap<JobId, Arc<LocalJob>>> {
+        self.local.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

@@ -17,7 +17,7 @@ use crate::store::jobs::JobId;
 pub const SECONDS_UNTIL_COUNTED: u64 = 5;
 
 /// Kept jobs by their ids, with the most that all owners and one owner may have.
-pub struct Kept {
+pub struct KeptJobs {
     most: usize,
     most_of_owner: usize,
     table: Mutex<Table>,
@@ -47,7 +47,7 @@ impl KeptJob {
     }
 }
 
-impl Kept {
+impl KeptJobs {
     pub fn new(most: usize, n_owners: usize) -> Self {
         Self { most, most_of_owner: share_of_one(most, n_owners), table: Mutex::default() }
     }

@@ -11,7 +11,6 @@
 
 pub mod changes;
 pub mod jobs;
-mod patience;
 pub mod pieces;
 mod place;
 pub mod room;
@@ -19,6 +18,7 @@ mod sweep;
 mod tally;
 #[cfg(test)]
 pub mod testing;
+mod timeouts;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -29,15 +29,15 @@ use object_store::path::Path;
 use object_store::{Error, ObjectStore, ObjectStoreExt, PutMode, PutOptions, PutPayload};
 use uuid::Uuid;
 
-use patience::WithTimeouts;
 pub use place::Place;
 pub use sweep::AT_WORK;
 pub use tally::{Tally, Verb};
+use timeouts::WithTimeouts;
 
 /// Reason why an object is not what was written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
-pub struct Damaged(pub &'static str);
+pub struct DamagedObject(pub &'static str);
 
 /// A failed call to the store.
 #[derive(Debug, Clone, thiserror::Error)]
@@ -49,7 +49,7 @@ pub struct Unavailable {
 }
 
 /// Time in which a store must show at the start that it works.
-const PATIENCE: Duration = Duration::from_secs(20);
+const PROBE_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// The store behind all caches in memory.
 pub struct Objects {
@@ -88,10 +88,10 @@ impl Objects {
             objects.store.get(&name).await?.bytes().await?;
             objects.store.delete(&name).await
         };
-        match tokio::time::timeout(PATIENCE, probe).await {
+        match tokio::time::timeout(PROBE_TIMEOUT, probe).await {
             Ok(Ok(())) => Ok(objects),
             Ok(Err(error)) => Err(format!("does not work: {error}")),
-            Err(_) => Err(format!("does not answer within {} s", PATIENCE.as_secs())),
+            Err(_) => Err(format!("does not answer within {} s", PROBE_TIMEOUT.as_secs())),
         }
     }
 
@@ -134,7 +134,7 @@ impl Objects {
     }
 
     /// Counts and logs a damaged object.
-    pub fn report(&self, name: &Path, damaged: Damaged) {
+    pub fn report(&self, name: &Path, damaged: DamagedObject) {
         self.count_damaged();
         tracing::error!(object = %name, reason = damaged.0, "an object is damaged");
     }

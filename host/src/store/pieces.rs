@@ -17,7 +17,7 @@ use object_store::path::Path;
 use object_store::{Error, ObjectStoreExt, PutPayload, WriteMultipart};
 
 use super::room::Room;
-use super::{Damaged, Objects, Unavailable, Verb};
+use super::{DamagedObject, Objects, Unavailable, Verb};
 
 /// Bytes of the hash at the end of an object.
 pub const HASH_BYTES: usize = 32;
@@ -40,7 +40,7 @@ const BYTES_PER_READER: usize = 256 << 10;
 const BYTES_PER_READER_OF_BUCKET: usize = 1 << 20;
 
 /// An object in the store, read as far as its first line.
-pub struct Found {
+pub struct OpenObject {
     pub line: Bytes,
     pub written_at: SystemTime,
     pub n_body_bytes: u64,
@@ -149,11 +149,11 @@ impl Objects {
     /// Opens an object that was written in pieces.
     ///
     /// # Errors
-    /// [`Unavailable`]. [`Damaged`] if its first line is missing.
+    /// [`Unavailable`]. [`DamagedObject`] if its first line is missing.
     pub(super) async fn open_pieces(
         &self,
         name: &Path,
-    ) -> Result<Option<Result<Found, Damaged>>, Unavailable> {
+    ) -> Result<Option<Result<OpenObject, DamagedObject>>, Unavailable> {
         let found = self.counted(Verb::Read, name, self.store.get(name).await)?;
         let Some(found) = found else { return Ok(None) };
         let (n_bytes, written_at) = (found.meta.size, SystemTime::from(found.meta.last_modified));
@@ -162,7 +162,7 @@ impl Objects {
         let first = loop {
             let next = bytes.try_next().await.map_err(|error| self.failed(Verb::Read, name, error))?;
             let Some(mut piece) = next.filter(|_| line.len() <= MAX_LINE) else {
-                return Ok(Some(Err(Damaged("its first line is missing"))));
+                return Ok(Some(Err(DamagedObject("its first line is missing"))));
             };
             let searched = &piece[..piece.len().min(MAX_LINE)];
             match memchr::memchr(b'\n', searched) {
@@ -180,8 +180,8 @@ impl Objects {
         let rest = bytes.map_err(|error| BrokenOff::Store(error.to_string())).boxed();
         let mut unread = Unread::default();
         unread.push(first);
-        let body = checked(Checked { hasher, unread, rest }).boxed();
-        Ok(Some(Ok(Found { line, written_at, n_body_bytes, body })))
+        let body = checked(CheckedReader { hasher, unread, rest }).boxed();
+        Ok(Some(Ok(OpenObject { line, written_at, n_body_bytes, body })))
     }
 }
 
@@ -200,12 +200,12 @@ pub(super) fn sealed(line: Bytes) -> PutPayload {
 /// Decodes the line of a short object.
 ///
 /// # Errors
-/// [`Damaged`] unless the object is as it was written.
-pub(super) fn unsealed(bytes: &[u8]) -> Result<&[u8], Damaged> {
-    let end = bytes.len().checked_sub(HASH_BYTES).ok_or(Damaged("it is truncated"))?;
+/// [`DamagedObject`] unless the object is as it was written.
+pub(super) fn unsealed(bytes: &[u8]) -> Result<&[u8], DamagedObject> {
+    let end = bytes.len().checked_sub(HASH_BYTES).ok_or(DamagedObject("it is truncated"))?;
     let (line, hash) = bytes.split_at(end);
     let is_whole = blake3::hash(line).as_bytes() == hash;
-    if is_whole { Ok(line) } else { Err(Damaged("its checksum does not match")) }
+    if is_whole { Ok(line) } else { Err(DamagedObject("its checksum does not match")) }
 }
 
 /// Received bytes that are not handed out yet.
@@ -235,13 +235,13 @@ impl Unread {
 }
 
 /// State of a reader of a body with its hash at the end.
-struct Checked {
+struct CheckedReader {
     hasher: blake3::Hasher,
     unread: Unread,
     rest: BoxStream<'static, Result<Bytes, BrokenOff>>,
 }
 
-impl Checked {
+impl CheckedReader {
     /// Returns the last bytes of the body if the hash matches.
     fn end(mut self) -> Result<Bytes, BrokenOff> {
         let mut body = self.unread.pieces.iter().flatten().copied().collect::<Vec<u8>>();
@@ -253,7 +253,7 @@ impl Checked {
 }
 
 /// Streams the body. Its last byte is held back until the hash is checked, so a damaged body breaks off.
-fn checked(state: Checked) -> impl Stream<Item = Result<Bytes, BrokenOff>> {
+fn checked(state: CheckedReader) -> impl Stream<Item = Result<Bytes, BrokenOff>> {
     futures_util::stream::unfold(Some(state), |state| async move {
         let mut state = state?;
         loop {

@@ -95,7 +95,7 @@ pub fn decompress(
         make_room(bytes.len())?;
         return Ok(bytes);
     }
-    let packed = || Packed { bytes: &bytes, observer };
+    let packed = || CompressedReader { bytes: &bytes, observer };
     let refused = |error: io::Error| match observer.checkpoint() {
         Err(_) => Problem::cancelled(),
         Ok(()) => {
@@ -153,12 +153,12 @@ fn read_blocks(
 /// A reader over a compressed body that checks for cancellation at every block.
 ///
 /// The compressed side needs checks of its own: a long body may decompress to no bytes at all.
-struct Packed<'a> {
+struct CompressedReader<'a> {
     bytes: &'a [u8],
     observer: &'a dyn Observer,
 }
 
-impl Read for Packed<'_> {
+impl Read for CompressedReader<'_> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         let length = self.fill_buf()?.read(out)?;
         self.consume(length);
@@ -166,7 +166,7 @@ impl Read for Packed<'_> {
     }
 }
 
-impl BufRead for Packed<'_> {
+impl BufRead for CompressedReader<'_> {
     fn fill_buf(&mut self) -> io::Result<&[u8]> {
         self.observer.checkpoint().map_err(io::Error::other)?;
         Ok(&self.bytes[..self.bytes.len().min(BLOCK_BYTES)])

@@ -77,12 +77,12 @@ impl Coding {
 
 /// Format and coding of the answer, negotiated from the request headers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Wanted {
+pub struct AnswerEncoding {
     pub format: Format,
     pub coding: Coding,
 }
 
-impl Wanted {
+impl AnswerEncoding {
     /// Chooses among the formats that are offered, which are ordered by the server's preference.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! What the vertices of a mesh rest on: points, a bridge over a gap between them, or nothing.
+//! Support of the vertices of a mesh: points, a bridge over a gap between them, or nothing.
 
 use rayon::prelude::*;
 
@@ -16,7 +16,7 @@ const BRIDGED: f64 = 8.0;
 /// Distance to the nearest point, in spacings there, from which a vertex is far from all points.
 const FAR: f64 = 3.0;
 
-/// What a vertex rests on.
+/// Support of a vertex.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Support {
     /// There are points within two spacings.

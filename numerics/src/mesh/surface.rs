@@ -64,7 +64,7 @@ pub fn mesh_of_surface(
         Ok(closedness)
     };
     let mesh = |field: &dyn Field, seeds: &Seeds<'_>| {
-        let found = level_set(&Sampled { cloud, sampling }.request(field, seeds, options), observer)?;
+        let found = level_set(&SampledCloud { cloud, sampling }.request(field, seeds, options), observer)?;
         let share = found.share_far();
         if share > MOST_FAR { Err(NumericsError::UnsupportedMesh { share }) } else { Ok(found) }
     };
@@ -98,7 +98,7 @@ pub fn mesh_of_surface(
 pub fn mesh_of_level(field: LevelOf<'_>, options: &MeshOptions, observer: &dyn Observer) -> Result<LevelSet> {
     let cloud = field.cloud();
     let sampling = Sampling::of(cloud, observer)?;
-    let sampled = Sampled { cloud, sampling: &sampling };
+    let sampled = SampledCloud { cloud, sampling: &sampling };
     let values = field.values(cloud.coordinates(), observer)?;
     let step = sampled.step(options);
     let seeds = |points: Range<usize>, observer: &dyn Observer| {
@@ -128,12 +128,12 @@ pub(super) const fn seed_bytes(dimension: usize) -> usize {
 
 /// A cloud with its sampling.
 #[derive(Clone, Copy)]
-struct Sampled<'a> {
+struct SampledCloud<'a> {
     cloud: &'a Cloud,
     sampling: &'a Sampling,
 }
 
-impl<'a> Sampled<'a> {
+impl<'a> SampledCloud<'a> {
     fn step(self, options: &MeshOptions) -> f64 {
         options.step.unwrap_or(self.sampling.scales().spacing)
     }

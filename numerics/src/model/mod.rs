@@ -23,7 +23,7 @@ use crate::points::sampling::Sampling;
 use crate::regression::function::interpolant::Interpolant;
 use crate::regression::function::local_kriging::LocalKriging;
 use crate::regression::solver::trend::Mean;
-use crate::regression::solver::{Known, Method, Solution, Solver, Sought};
+use crate::regression::solver::{EarlierSolutions, Method, RightHandSide, Solution, Solver};
 use crate::surface::Surface;
 use crate::surface::local::{Given, LocalSurface};
 use crate::surface::signature::{Signature, SignatureSurface};
@@ -49,7 +49,7 @@ pub struct SurfaceMaking<'a> {
     pub sampling: Arc<Sampling>,
     pub given: Given<'a>,
     /// What is known of the weights of the signature function, which interpolates the constant 1.
-    pub signature: Known,
+    pub signature: EarlierSolutions,
 }
 
 impl Model {
@@ -103,11 +103,11 @@ impl Model {
         &self,
         values: &[f64],
         mean: Mean,
-        known: Known,
+        known: EarlierSolutions,
         observer: &dyn Observer,
     ) -> Result<Interpolant> {
         let solver = self.solver()?.clone();
-        let sought = Sought { values, earlier: &known.earlier };
+        let sought = RightHandSide { values, earlier: &known.earlier };
         let solution = match known.these {
             Some(solution) => {
                 solver.knows_weights(observer);

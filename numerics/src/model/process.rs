@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use crate::error::Result;
 use crate::kernel::Kernel;
 use crate::kernel::defaults::DEFAULT_ALPHA;
-use crate::regression::selection::Learned;
+use crate::regression::selection::LearnedModel;
 use crate::regression::sums::regularization::Regularization;
 
 /// Ratios of noise to variance that lose no digit.
@@ -43,8 +43,8 @@ impl ScaledProcess {
     ///
     /// # Errors
     /// `NumericsError::InvalidKernelParameter`, `NumericsError::InvalidRegularization`.
-    pub fn learned(learned: &Learned, given: Option<Regularization>) -> Result<Self> {
-        let Learned { ratio, variance, .. } = *learned;
+    pub fn learned(learned: &LearnedModel, given: Option<Regularization>) -> Result<Self> {
+        let LearnedModel { ratio, variance, .. } = *learned;
         match given_or(given, ratio * variance)? {
             // A learned variance may leave the range of kernels, so it becomes the scale of a kernel of
             // variance 1.

@@ -9,7 +9,7 @@ use crate::regression::function::deviations::JetDeviations;
 use crate::regression::function::interpolant::Interpolant;
 use crate::regression::function::local_kriging::{KrigingRequest, LocalKriging};
 use crate::regression::function::posterior::{Variances, variances_with_mean};
-use crate::regression::solver::Known;
+use crate::regression::solver::EarlierSolutions;
 use crate::regression::solver::trend::{Mean, Trend};
 use crate::regression::sums::jets::{JetOrder, Jets};
 
@@ -73,7 +73,7 @@ impl Model {
         &self,
         fitted: FittedValues<'_>,
         request: JetRequest<'_>,
-        known: Known,
+        known: EarlierSolutions,
         observer: &dyn Observer,
     ) -> Result<ValuesAt> {
         match self {

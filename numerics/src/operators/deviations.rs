@@ -37,7 +37,8 @@ impl Operator {
         queries: &Cloud,
         observer: &dyn Observer,
     ) -> Result<Vec<f64>> {
-        let mut total = Applied { geometry, interpolant, factor, queries }.of_function(self, observer)?;
+        let mut total =
+            AppliedOperator { geometry, interpolant, factor, queries }.of_function(self, observer)?;
         if geometry.deviations().is_some() {
             self.add_surface(geometry, &interpolant.at(queries, self.order(), observer)?, &mut total);
         }
@@ -91,14 +92,14 @@ fn add_surface_to_gradient(geometry: &Geometry, jets: &Jets, total: &mut [f64]) 
 }
 
 /// An operator applied to a function. Kernel and noise are `factor` times those of the solver.
-pub(super) struct Applied<'a> {
+pub(super) struct AppliedOperator<'a> {
     pub(super) geometry: &'a Geometry,
     pub(super) interpolant: &'a Interpolant,
     pub(super) factor: f64,
     pub(super) queries: &'a Cloud,
 }
 
-impl Applied<'_> {
+impl AppliedOperator<'_> {
     /// Computes the deviations that come from the function alone: `[m]` or `[m, d]`.
     fn of_function(&self, operator: Operator, observer: &dyn Observer) -> Result<Vec<f64>> {
         let Interpolant { solver, solution } = self.interpolant;

@@ -19,7 +19,7 @@ use crate::points::thinning::thinned_points;
 use crate::regression::function::errors::{Judgement, Process};
 use crate::regression::function::functionals::{JetFunctional, ScaledFit, deviations, has_variance};
 use crate::regression::function::interpolant::Interpolant;
-use crate::regression::selection::Learned;
+use crate::regression::selection::LearnedModel;
 use crate::regression::solver::trend::Trend;
 use crate::regression::sums::regularization::Regularization;
 use crate::surface::geometry::Geometry;
@@ -47,7 +47,7 @@ const N_BEFOREHAND: usize = 4;
 
 /// Answers to be judged: an operator on a function. Kernel and noise are `factor` times those of the solver.
 #[derive(Clone, Copy)]
-pub struct Judged<'a> {
+pub struct OperatorAnswers<'a> {
     pub geometry: &'a Geometry,
     pub interpolant: &'a Interpolant,
     pub factor: f64,
@@ -55,10 +55,10 @@ pub struct Judged<'a> {
     /// Answers of the operator, `[m, k]`.
     pub found: &'a [f64],
     /// Process learned from the values, where the kernel is given.
-    pub learned: Option<&'a Learned>,
+    pub learned: Option<&'a LearnedModel>,
 }
 
-impl Judged<'_> {
+impl OperatorAnswers<'_> {
     /// Finds the queries, ascending, that known deviations `[m, k]` make uncertain.
     ///
     /// # Errors
@@ -143,7 +143,7 @@ impl Judged<'_> {
             let process = Process { kernel, noise, factor, trend };
             Judgement { process, interpolant, queries }.errors(functionals, observer)
         };
-        if let Some(Learned { ratio, trend, .. }) = self.learned {
+        if let Some(LearnedModel { ratio, trend, .. }) = self.learned {
             return errors_under(*ratio, trend.as_ref());
         }
         match deviations(ScaledFit { solver, solution, factor }, queries, functionals, observer) {

@@ -17,7 +17,7 @@ use crate::surface::geometry::Geometry;
 
 /// A function through values, kriged around each query.
 #[derive(Clone, Copy)]
-pub struct Kriged<'a> {
+pub struct KrigedFunction<'a> {
     pub moving: &'a LocalKriging,
     /// `[n]`, unit V.
     pub values: &'a [f64],
@@ -47,7 +47,7 @@ impl Operator {
     pub fn on_kriged(
         self,
         geometry: &Geometry,
-        function: Kriged<'_>,
+        function: KrigedFunction<'_>,
         queries: &Cloud,
         observer: &dyn Observer,
     ) -> Result<OfKriged> {
@@ -55,7 +55,7 @@ impl Operator {
     }
 }
 
-impl Kriged<'_> {
+impl KrigedFunction<'_> {
     fn with(
         self,
         operator: Operator,

@@ -31,8 +31,8 @@ use crate::regression::sums::nodes::{BlockPairs, Nodes};
 use crate::surface::curvature::tangential_trace;
 use crate::surface::geometry::Geometry;
 pub(crate) use doubts::JUDGED_FUNCTIONALS;
-pub use doubts::Judged;
-pub use kriged::{Kriged, OfKriged};
+pub use doubts::OperatorAnswers;
+pub use kriged::{KrigedFunction, OfKriged};
 pub use stencils::{RowKind, SparseMatrix, Stencils};
 
 /// An operator on functions u over a surface. Answers at null queries are zero.

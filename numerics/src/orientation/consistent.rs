@@ -5,7 +5,7 @@ use super::forest::SignedForest;
 use super::parts::Parts;
 use super::pieces::{Bounds, Piece, is_large};
 use super::winding::field::Field;
-use super::{Directions, Sampled, gaps, n_neighbours, sides};
+use super::{CloudWithNeighbours, Directions, gaps, n_neighbours, sides};
 use crate::error::NumericsError;
 use crate::machine::vector::dot;
 use crate::observer::for_each;
@@ -42,7 +42,7 @@ pub(super) struct Signs {
 
 /// Makes the signs of normals consistent. Winding numbers turn nothing where normals are given.
 pub(super) fn consistent_signs(
-    sampled: &Sampled<'_>,
+    sampled: &CloudWithNeighbours<'_>,
     directions: &Directions,
     is_given: bool,
 ) -> Result<Signs, NumericsError> {
@@ -96,7 +96,7 @@ pub(super) fn joined(edges: &[Edge], has_sign: &[bool]) -> SignedForest {
 
 /// A cloud with the pieces of its surface.
 struct Scene<'a> {
-    sampled: &'a Sampled<'a>,
+    sampled: &'a CloudWithNeighbours<'a>,
     directions: &'a Directions,
     pieces: &'a Parts,
     /// The sign of each point relative to its piece, `[n]`.

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::forest::SignedForest;
-use super::{Sampled, n_neighbours};
+use super::{CloudWithNeighbours, n_neighbours};
 use crate::error::Result;
 use crate::machine::vector::dot;
 use crate::points::cloud::{Cloud, squared_distance};
@@ -86,7 +86,7 @@ fn cosine(cloud: &Cloud, normals: &[f64], a: usize, b: usize) -> f64 {
 ///
 /// # Errors
 /// [`crate::error::NumericsError::Cancelled`].
-pub(super) fn sheet_edges(sampled: &Sampled<'_>, normals: &[f64]) -> Result<Vec<Edge>> {
+pub(super) fn sheet_edges(sampled: &CloudWithNeighbours<'_>, normals: &[f64]) -> Result<Vec<Edge>> {
     let edges_of = |a: usize| edges_around(sampled.cloud, normals, a, sampled.around.around(a));
     let n = sampled.cloud.n_points();
     // Block by block, so that they are not held twice.

@@ -10,7 +10,7 @@ pub(super) struct SignedForest {
 
 /// The place of a member in a forest.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Found {
+pub(super) struct Membership {
     pub root: usize,
     /// Sign relative to the root, +1 or −1.
     pub sign: f64,
@@ -24,18 +24,18 @@ impl SignedForest {
     /// Finds the root of a member and the sign relative to it.
     ///
     /// Depth is logarithmic, because smaller sets join larger ones.
-    pub(super) fn find(&mut self, member: usize) -> Found {
+    pub(super) fn find(&mut self, member: usize) -> Membership {
         let (mut root, mut sign) = (member, 1.0);
         while self.parents[root] != root {
             sign *= self.signs[root];
             root = self.parents[root];
         }
         (self.parents[member], self.signs[member]) = (root, sign);
-        Found { root, sign }
+        Membership { root, sign }
     }
 
     /// Finds the root and sign of every member.
-    pub(super) fn find_all(&mut self) -> Vec<Found> {
+    pub(super) fn find_all(&mut self) -> Vec<Membership> {
         (0..self.parents.len()).map(|member| self.find(member)).collect()
     }
 

@@ -5,9 +5,9 @@
 
 use rayon::prelude::*;
 
-use super::Sampled;
+use super::CloudWithNeighbours;
 use super::edges::Edge;
-use super::forest::{Found, SignedForest};
+use super::forest::{Membership, SignedForest};
 use crate::error::NumericsError;
 use crate::points::neighbours::Neighbour;
 
@@ -36,7 +36,7 @@ struct Gap {
 /// # Errors
 /// [`NumericsError::Cancelled`].
 pub(super) fn join_across(
-    sampled: &Sampled<'_>,
+    sampled: &CloudWithNeighbours<'_>,
     normals: &[f64],
     forest: &mut SignedForest,
 ) -> Result<Vec<Edge>, NumericsError> {
@@ -70,7 +70,12 @@ struct Bridge {
 }
 
 /// Returns the bridge between two pieces if the shortest ways between them agree. `gaps` are shortest first.
-fn bridge(sampled: &Sampled<'_>, normals: &[f64], found: &[Found], gaps: &[Gap]) -> Option<Bridge> {
+fn bridge(
+    sampled: &CloudWithNeighbours<'_>,
+    normals: &[f64],
+    found: &[Membership],
+    gaps: &[Gap],
+) -> Option<Bridge> {
     let shortest = *gaps.first()?;
     let near = gaps.iter().take(N_VOTES).filter(|gap| gap.squared_length <= 4.0 * shortest.squared_length);
     let (mut vote, mut count) = (0.0, 0.0);
@@ -83,7 +88,11 @@ fn bridge(sampled: &Sampled<'_>, normals: &[f64], found: &[Found], gaps: &[Gap])
 }
 
 /// Finds ways from the points of every piece but the largest to the nearest points of other pieces.
-fn gaps(sampled: &Sampled<'_>, forest: &SignedForest, found: &[Found]) -> Result<Vec<Gap>, NumericsError> {
+fn gaps(
+    sampled: &CloudWithNeighbours<'_>,
+    forest: &SignedForest,
+    found: &[Membership],
+) -> Result<Vec<Gap>, NumericsError> {
     let roots = (0..found.len()).filter(|&point| found[point].root == point);
     let Some(largest) = roots.max_by_key(|&root| (forest.size(root), usize::MAX - root)) else {
         return Ok(Vec::new());

@@ -41,7 +41,7 @@ use consistent::consistent_signs;
 
 /// A cloud with its sampling, its neighbourhoods and an observer.
 #[derive(Clone, Copy)]
-pub(crate) struct Sampled<'a> {
+pub(crate) struct CloudWithNeighbours<'a> {
     pub cloud: &'a Cloud,
     pub sampling: &'a Sampling,
     /// The nearest positions around each point, [`n_around`] or more.
@@ -88,7 +88,7 @@ pub struct SurfaceOrientation {
 }
 
 /// Outward normals at the points.
-pub(crate) struct Oriented {
+pub(crate) struct OrientedNormals {
     /// Unit vectors `[n, d]`, zero where nothing is known.
     pub normals: Vec<f64>,
     pub how: SurfaceOrientation,
@@ -98,13 +98,13 @@ pub(crate) struct Oriented {
     pub is_ambiguous: Vec<bool>,
 }
 
-impl Oriented {
+impl OrientedNormals {
     /// Orients normals. If `given` are normals of the client, `[n, d]`, of any length but 0, they decide.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
     pub(crate) fn of(
-        sampled: &Sampled<'_>,
+        sampled: &CloudWithNeighbours<'_>,
         directions: Directions,
         quadrics: &LocalQuadrics,
         given: Option<&Cloud>,
@@ -121,7 +121,7 @@ impl Oriented {
     /// # Errors
     /// [`NumericsError::Cancelled`].
     pub(crate) fn of_directions(
-        sampled: &Sampled<'_>,
+        sampled: &CloudWithNeighbours<'_>,
         directions: Directions,
         is_given: bool,
     ) -> Result<Self, NumericsError> {

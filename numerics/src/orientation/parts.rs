@@ -1,7 +1,7 @@
 //! A cloud divided into disjoint parts.
 
 use super::edges::{Edge, edges_of};
-use super::forest::Found;
+use super::forest::Membership;
 
 /// Agreement above which an edge is sure: the surface leads from one of its points to the other.
 const SURE: f64 = 0.5;
@@ -16,11 +16,11 @@ pub(super) struct Parts {
 
 impl Parts {
     /// Makes a part of the points with each root.
-    pub(super) fn of(found: &[Found]) -> Self {
+    pub(super) fn of(found: &[Membership]) -> Self {
         let mut part_of_root = vec![usize::MAX; found.len()];
         let mut members: Vec<Vec<usize>> = Vec::new();
         let mut of_point = Vec::with_capacity(found.len());
-        for (point, &Found { root, .. }) in found.iter().enumerate() {
+        for (point, &Membership { root, .. }) in found.iter().enumerate() {
             if part_of_root[root] == usize::MAX {
                 part_of_root[root] = members.len();
                 members.push(Vec::new());

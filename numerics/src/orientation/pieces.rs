@@ -1,6 +1,6 @@
 //! Connected pieces of a surface, and the sign of each by itself.
 
-use super::{Directions, Sampled};
+use super::{CloudWithNeighbours, Directions};
 use crate::points::cloud::Cloud;
 use crate::points::sampling::Sampling;
 
@@ -56,7 +56,7 @@ pub(super) fn are_several(volumes: [f64; 2], dimension: usize) -> bool {
 
 /// A connected part of the surface with signs relative to one another.
 pub(super) struct Piece<'a> {
-    pub sampled: &'a Sampled<'a>,
+    pub sampled: &'a CloudWithNeighbours<'a>,
     pub directions: &'a Directions,
     pub points: &'a [usize],
     pub relative: &'a [f64],

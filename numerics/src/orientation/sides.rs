@@ -4,7 +4,7 @@ use super::edges::{Edge, averaged};
 use super::parts::Parts;
 use super::winding::field::Field;
 use super::winding::gauss::Problem;
-use super::winding::turns::{Turned, turn_patches};
+use super::winding::turns::{TurnedPatches, turn_patches};
 use crate::error::NumericsError;
 
 /// Distance of the winding number from ½, averaged over the neighbours on the sheet, beyond which a side is
@@ -60,7 +60,7 @@ pub(super) fn settle(
     if sheets.members.len() > pieces.members.len() {
         turn_wrong(sheets, field, edges, signs)?;
     }
-    let Turned { misfits, is_cut, unclear } = turn_patches(field, pieces, edges, signs)?;
+    let TurnedPatches { misfits, is_cut, unclear } = turn_patches(field, pieces, edges, signs)?;
     let near = pieces.shares(&misfits, |misfit| misfit <= BOUNDS);
     let doubt = |(point, misfit): (usize, f64)| {
         let piece = pieces.of_point[point];

@@ -1,7 +1,7 @@
 //! Signs of clouds whose sides are known.
 
 use super::consistent::{Signs, consistent_signs};
-use super::{Directions, Sampled};
+use super::{CloudWithNeighbours, Directions};
 use crate::observer::Unobserved;
 use crate::points::cloud::Cloud;
 use crate::points::neighbourhoods::Neighbourhoods;
@@ -11,7 +11,7 @@ use crate::testing::{Random, fibonacci_sphere};
 fn signs_of(cloud: &Cloud, directions: &Directions) -> Signs {
     let sampling = Sampling::of(cloud, &Unobserved).unwrap();
     let around = Neighbourhoods::of(sampling.neighbours(), cloud, 18, &Unobserved).unwrap();
-    let sampled = Sampled { cloud, sampling: &sampling, around: &around, observer: &Unobserved };
+    let sampled = CloudWithNeighbours { cloud, sampling: &sampling, around: &around, observer: &Unobserved };
     consistent_signs(&sampled, directions, false).unwrap()
 }
 

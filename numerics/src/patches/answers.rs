@@ -6,8 +6,8 @@ use smallvec::SmallVec;
 use super::estimate::Estimate;
 use super::level::Level;
 use super::neighbourhood::Neighbourhood;
-use super::pooled::Weighted;
-use super::regression::{Kriged, n_terms};
+use super::pooled::WeightedModel;
+use super::regression::{ModelResult, n_terms};
 use super::room::{Purpose, Room};
 use super::{Coarser, Patches};
 use crate::error::{NumericsError, Result};
@@ -260,10 +260,10 @@ impl Level {
 type Estimates = SmallVec<[Option<Estimate>; MAX_LANES]>;
 
 /// Estimates in the lanes with a neighbourhood that is large enough for the models.
-fn mixed(room: &mut Room<'_>, places: &[Option<Neighbourhood>], mixture: &[Weighted]) -> Estimates {
+fn mixed(room: &mut Room<'_>, places: &[Option<Neighbourhood>], mixture: &[WeightedModel]) -> Estimates {
     room.krige(mixture.iter().map(|weighted| &weighted.model), Purpose::Prediction);
     let d = room.dimension();
-    let of = |(place, kriged): (&Option<Neighbourhood>, &Vec<Kriged>)| {
+    let of = |(place, kriged): (&Option<Neighbourhood>, &Vec<ModelResult>)| {
         place.as_ref().and_then(|_| Estimate::of(mixture, kriged, d))
     };
     places.iter().zip(&room.kriged).map(of).collect()

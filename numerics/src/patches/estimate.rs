@@ -1,7 +1,7 @@
 //! Estimate of the surface at one query: the mixture of the models there.
 
-use super::pooled::{Weighted, responsibilities};
-use super::regression::{Kriged, Squares, Terms, n_terms};
+use super::pooled::{WeightedModel, responsibilities};
+use super::regression::{ModelResult, Squares, Terms, n_terms};
 use crate::machine::eigen::symmetric_eigen;
 use crate::machine::small::{Small, zeros};
 
@@ -55,7 +55,7 @@ pub(crate) struct Estimate {
 
 impl Estimate {
     /// Mixes the models by their posterior probabilities. Returns `None` if no model has an answer.
-    pub(crate) fn of(models: &[Weighted], kriged: &[Kriged], dimension: usize) -> Option<Self> {
+    pub(crate) fn of(models: &[WeightedModel], kriged: &[ModelResult], dimension: usize) -> Option<Self> {
         let p = n_terms(dimension);
         let shares = responsibilities(models, kriged);
         let mut means = Terms::from_elem(0.0, p);

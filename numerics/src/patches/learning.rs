@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::level::Level;
 use super::levels::median_excess;
 use super::means::Support;
-use super::pooled::{Kind, Weighted, pool, responsibilities};
+use super::pooled::{Kind, WeightedModel, pool, responsibilities};
 use super::regression::{Model, n_terms};
 use super::room::{Found, Purpose};
 use super::{Agreement, Coarser, PatchGeometry, PatchKernel, Patches, check_dimension};
@@ -199,7 +199,7 @@ impl Level {
         kinds: &[Kind],
         queries: &Cloud,
         observer: &dyn Observer,
-    ) -> Result<Vec<Weighted>, NumericsError> {
+    ) -> Result<Vec<WeightedModel>, NumericsError> {
         let candidates: Vec<Model> = kinds.iter().flat_map(|kind| kind.candidates()).collect();
         let least_share = kinds.iter().map(|kind| kind.least_share()).fold(0.0, f64::max);
         let found = self.krige_each(queries, &candidates, Purpose::Likelihood, observer)?;
@@ -210,7 +210,7 @@ impl Level {
     /// Returns noise and kernel of the heights by these models: medians over the sites.
     fn scales(
         &self,
-        models: &[Weighted],
+        models: &[WeightedModel],
         sites: &Cloud,
         observer: &dyn Observer,
     ) -> Result<Scales, NumericsError> {
@@ -238,13 +238,13 @@ struct Scales {
 
 /// Returns the variance of the noise (L²), ℓ (L) and s² (L²) of one neighbourhood, `None` where no model has
 /// an answer.
-fn scales(models: &[Weighted], (place, kriged): &Found) -> Option<[f64; 3]> {
+fn scales(models: &[WeightedModel], (place, kriged): &Found) -> Option<[f64; 3]> {
     let shares = responsibilities(models, kriged);
     if shares.iter().all(|share| *share == 0.0) {
         return None;
     }
     let (mut noise, mut length_scale, mut variance) = (0.0, 0.0, 0.0);
-    for ((share, kriged), Weighted { model, .. }) in shares.iter().zip(kriged).zip(models) {
+    for ((share, kriged), WeightedModel { model, .. }) in shares.iter().zip(kriged).zip(models) {
         if *share > 0.0 {
             length_scale += share * model.length_scale * place.radius;
             variance += share * kriged.scale * place.radius.powi(2);

@@ -2,17 +2,17 @@
 
 use super::means::Support;
 use super::neighbourhood::n_neighbours;
-use super::pooled::Weighted;
+use super::pooled::WeightedModel;
 use crate::machine::heap::vec_bytes;
 
 /// Local regressions over the points, or over means of equally many.
 pub(crate) struct Level {
     pub support: Support,
-    pub models: Vec<Weighted>,
+    pub models: Vec<WeightedModel>,
     /// Models for the slopes where the surface is flat. Empty where there is no noise.
-    pub stiff: Vec<Weighted>,
+    pub stiff: Vec<WeightedModel>,
     /// Models with a trend of fourth order, where points are exact and the surface is smooth enough.
-    pub quartic: Vec<Weighted>,
+    pub quartic: Vec<WeightedModel>,
     /// Points, or means, in a neighbourhood. Below `n_terms(d) + 2`, no query has an answer.
     pub count: usize,
     /// Noise of a point that neighbourhoods do not take for a bend, unit L.

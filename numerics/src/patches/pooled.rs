@@ -1,7 +1,7 @@
 //! Hyperparameters from the likelihood pooled over a sample of neighbourhoods.
 
 use super::NoiseRatio;
-use super::regression::{Kriged, Model, Trend};
+use super::regression::{Model, ModelResult, Trend};
 use crate::kernel::Family;
 
 /// Order of Matérn's kernel: ν = 9/2. Kriged curvatures of analytic surfaces are then as far off as their
@@ -51,7 +51,7 @@ const STEPS: usize = 100;
 
 /// A model with the logarithm of the share of neighbourhoods that it describes.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Weighted {
+pub(crate) struct WeightedModel {
     pub model: Model,
     pub log_share: f64,
 }
@@ -77,9 +77,11 @@ impl Kind {
     }
 
     /// The mixture with these noise ratios.
-    pub(crate) fn mixture(self, ratios: &[NoiseRatio]) -> Vec<Weighted> {
-        let of =
-            |&NoiseRatio { ratio, log_share }: &NoiseRatio| Weighted { model: self.model(ratio), log_share };
+    pub(crate) fn mixture(self, ratios: &[NoiseRatio]) -> Vec<WeightedModel> {
+        let of = |&NoiseRatio { ratio, log_share }: &NoiseRatio| WeightedModel {
+            model: self.model(ratio),
+            log_share,
+        };
         ratios.iter().map(of).collect()
     }
 
@@ -88,7 +90,7 @@ impl Kind {
     }
 
     /// The ratios of a mixture that belong to models of this kind.
-    pub(crate) fn ratios(self, models: &[Weighted]) -> Vec<NoiseRatio> {
+    pub(crate) fn ratios(self, models: &[WeightedModel]) -> Vec<NoiseRatio> {
         let own = models.iter().filter(|of| self.describes(&of.model));
         own.map(|of| NoiseRatio { ratio: of.model.noise, log_share: of.log_share }).collect()
     }
@@ -117,14 +119,18 @@ impl Kind {
 ///
 /// `log_likelihoods` is `[neighbourhoods][models]`. The shares come from expectation and maximization
 /// (nonparametric maximum likelihood: Laird 1978).
-pub(crate) fn pool(least_share: f64, candidates: &[Model], log_likelihoods: &[Vec<f64>]) -> Vec<Weighted> {
+pub(crate) fn pool(
+    least_share: f64,
+    candidates: &[Model],
+    log_likelihoods: &[Vec<f64>],
+) -> Vec<WeightedModel> {
     let n = candidates.len();
     let shares = mixture_shares(n, log_likelihoods);
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|&a, &b| shares[b].total_cmp(&shares[a]));
     let kept = order.into_iter().enumerate().filter(|&(rank, at)| rank == 0 || shares[at] > least_share);
     let kept = kept.take(MAX_MODELS).map(|(_, at)| at);
-    kept.map(|at| Weighted { model: candidates[at], log_share: shares[at].ln() }).collect()
+    kept.map(|at| WeightedModel { model: candidates[at], log_share: shares[at].ln() }).collect()
 }
 
 /// Returns the shares of `n` components that make a sample most likely: expectation and maximization
@@ -162,7 +168,7 @@ pub(crate) fn normalized(logs: &[f64]) -> Vec<f64> {
 }
 
 /// Posterior probabilities of the models of one neighbourhood.
-pub(crate) fn responsibilities(models: &[Weighted], kriged: &[Kriged]) -> Vec<f64> {
+pub(crate) fn responsibilities(models: &[WeightedModel], kriged: &[ModelResult]) -> Vec<f64> {
     let logs = models.iter().zip(kriged).map(|(model, kriged)| model.log_share + kriged.log_likelihood);
     normalized(&logs.collect::<Vec<f64>>())
 }

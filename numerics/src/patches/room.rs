@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::level::Level;
 use super::neighbourhood::{Neighbourhood, Scratch};
-use super::regression::{Batch, Krige, Kriged, Model, workspace};
+use super::regression::{Batch, Krige, Model, ModelResult, workspace};
 use crate::error::Result;
 use crate::machine::instruction_set::InstructionSet;
 use crate::machine::lanes::Workspace;
@@ -15,7 +15,7 @@ use crate::points::cloud::Cloud;
 use crate::points::neighbours::{Neighbour, Walk};
 
 /// A neighbourhood with the result of each model there.
-pub(super) type Found = (Neighbourhood, Vec<Kriged>);
+pub(super) type Found = (Neighbourhood, Vec<ModelResult>);
 
 /// Purpose for which a batch is solved. Derivatives at the query are computed for predictions only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,7 +36,7 @@ pub(super) struct Room<'a> {
     /// True if no lane has a neighbourhood.
     is_empty: bool,
     /// Results by lane and model.
-    pub kriged: Vec<Vec<Kriged>>,
+    pub kriged: Vec<Vec<ModelResult>>,
 }
 
 impl<'a> Room<'a> {

@@ -75,7 +75,7 @@ impl LocalQuadric<'_> {
 
 /// Outcome of the fit at one position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Found {
+enum FitOutcome {
     /// The neighbours do not determine a quadric.
     Nothing,
     Inside,
@@ -87,7 +87,7 @@ pub(crate) struct LocalQuadrics {
     dimension: usize,
     /// Normal, curvatures, height, residual, uncertainty and radius, `[m, 2d + 3]`.
     rows: Vec<f64>,
-    found: Vec<Found>,
+    found: Vec<FitOutcome>,
 }
 
 impl LocalQuadrics {
@@ -104,12 +104,12 @@ impl LocalQuadrics {
     ) -> Result<Self> {
         let (m, d) = (queries.n_points(), cloud.dimension());
         let width = width(d);
-        let (mut rows, mut found) = (vec![0.0; m * width], vec![Found::Nothing; m]);
+        let (mut rows, mut found) = (vec![0.0; m * width], vec![FitOutcome::Nothing; m]);
         let slots = rows.par_chunks_exact_mut(width).zip(&mut found);
         slots.enumerate().try_for_each(|(query, (row, found))| {
             observer.checkpoint()?;
             let nearest = neighbourhoods.around(query);
-            *found = fit(cloud, queries.point(query), nearest, row).unwrap_or(Found::Nothing);
+            *found = fit(cloud, queries.point(query), nearest, row).unwrap_or(FitOutcome::Nothing);
             Ok::<_, NumericsError>(())
         })?;
         Ok(Self { dimension: d, rows, found })
@@ -118,13 +118,13 @@ impl LocalQuadrics {
     /// Returns the quadric at a position, or `None` if its neighbours do not determine one.
     pub(crate) fn at(&self, position: usize) -> Option<LocalQuadric<'_>> {
         let (d, width) = (self.dimension, width(self.dimension));
-        if self.found[position] == Found::Nothing {
+        if self.found[position] == FitOutcome::Nothing {
             return None;
         }
         let (normal, rest) = self.rows[position * width..][..width].split_at(d);
         let (curvatures, rest) = rest.split_at(d - 1);
         let &[height, residual, uncertainty, radius] = rest else { return None };
-        let is_at_rim = self.found[position] == Found::AtRim;
+        let is_at_rim = self.found[position] == FitOutcome::AtRim;
         Some(LocalQuadric { normal, curvatures, height, residual, uncertainty, radius, is_at_rim })
     }
 
@@ -143,7 +143,7 @@ fn width(dimension: usize) -> usize {
 ///
 /// Cubic terms of the surface tilt the frame of the principal axes. So a second quadric is fitted over the
 /// tangent plane of the first, which they do not tilt.
-fn fit(cloud: &Cloud, x: &[f64], nearest: &[u32], row: &mut [f64]) -> Option<Found> {
+fn fit(cloud: &Cloud, x: &[f64], nearest: &[u32], row: &mut [f64]) -> Option<FitOutcome> {
     let mut patch = Patch::of(cloud, x, nearest.iter().map(|&point| point as usize))?;
     let first = Quadric::of(&patch)?;
     patch.turn_over(&first.slope);
@@ -160,7 +160,7 @@ fn fit(cloud: &Cloud, x: &[f64], nearest: &[u32], row: &mut [f64]) -> Option<Fou
     let errors = directions.chunks_exact(d - 1).map(|direction| quadric.standard_error(direction));
     let uncertainty = errors.fold(0.0, f64::max) / patch.radius;
     row[2 * d - 1..].copy_from_slice(&[height, quadric.residual * patch.radius, uncertainty, patch.radius]);
-    Some(if patch.is_at_rim() { Found::AtRim } else { Found::Inside })
+    Some(if patch.is_at_rim() { FitOutcome::AtRim } else { FitOutcome::Inside })
 }
 
 #[cfg(test)]
@@ -177,7 +177,7 @@ mod tests {
         let mut rows = vec![0.0; width(d)];
         let nearest = Neighbours::of(cloud, &Unobserved).unwrap().nearest_positions(x, count);
         let nearest: Vec<u32> = nearest.iter().map(|found| found.point as u32).collect();
-        let found = fit(cloud, x, &nearest, &mut rows).unwrap_or(Found::Nothing);
+        let found = fit(cloud, x, &nearest, &mut rows).unwrap_or(FitOutcome::Nothing);
         LocalQuadrics { dimension: d, rows, found: vec![found] }
     }
 

@@ -6,7 +6,7 @@ use super::Surface;
 use super::curvature::{principal_curvatures, tangential_trace};
 use super::flags::{Flag, FlagReason, Resolution, is_far};
 pub use super::request::{GeometryRequest, Orientation, SurfaceModel};
-use super::served::{Deviations, Edge, Served, ServedBy};
+use super::served::{Deviations, Edge, GeometryArrays, ServedBy};
 use crate::error::{NumericsError, Result};
 use crate::machine::vector::norm;
 use crate::observer::Observer;
@@ -17,7 +17,7 @@ use crate::points::sampling::Sampling;
 ///
 /// The normal of a query without an answer is zero and meaningless: ask [`Geometry::is_null`] first.
 pub struct Geometry {
-    served: Served,
+    served: GeometryArrays,
     /// `[m]`
     gradient_norms: Vec<f64>,
     /// `[m, d]`, norm 1.

@@ -20,7 +20,7 @@ use crate::points::sampling::{SPACING_NEIGHBOURS, Sampling};
 use crate::regression::function::interpolant::Interpolant;
 use geometry::GeometryRequest;
 use local::LocalSurface;
-use served::Served;
+use served::GeometryArrays;
 use signature::SignatureSurface;
 
 /// A surface with consistently oriented normals at the points, d ≥ 2.
@@ -104,7 +104,12 @@ impl Surface {
         }
     }
 
-    fn serve(&self, queries: &Cloud, request: &GeometryRequest, observer: &dyn Observer) -> Result<Served> {
+    fn serve(
+        &self,
+        queries: &Cloud,
+        request: &GeometryRequest,
+        observer: &dyn Observer,
+    ) -> Result<GeometryArrays> {
         match self {
             Self::Signature(surface) => signature::serve(surface, queries, request, observer),
             Self::Local(surface) => surface.serve(queries, request, observer),

@@ -37,7 +37,7 @@ pub struct Edge {
 }
 
 /// Geometry of the surface at m queries, in flat arrays.
-pub(crate) struct Served {
+pub(crate) struct GeometryArrays {
     pub(super) dimension: usize,
     /// Gradient of the function that serves each query, `[m, d]`.
     pub(super) gradients: Vec<f64>,
@@ -66,7 +66,7 @@ impl Verdict {
     }
 }
 
-impl Served {
+impl GeometryArrays {
     pub(crate) fn gradient(&self, query: usize) -> &[f64] {
         &self.gradients[query * self.dimension..][..self.dimension]
     }

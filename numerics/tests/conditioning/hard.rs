@@ -17,7 +17,7 @@ use serde_json::Value;
 use crate::support::{jets as fit_jets, *};
 
 /// Errors that numpy reached, relative to the maximum of each array. Those of variances are absolute.
-struct Reached {
+struct NumpyErrors {
     case: &'static str,
     value: f64,
     gradient: f64,
@@ -30,11 +30,11 @@ struct Reached {
 
 /// The README's table, in the order of the file.
 #[rustfmt::skip]
-const REACHED: [Reached; 4] = [
-    Reached { case: "ellipse 32, gauss", value: 8e-14, gradient: 2e-13, normals: 7e-14, curvatures: 3e-13, laplacian: 4e-13, matrix: 2e-9, variance: 1e-16 },
-    Reached { case: "sphere 64, gauss", value: 4e-14, gradient: 1e-13, normals: 2e-15, curvatures: 9e-15, laplacian: 3e-13, matrix: 4e-11, variance: 3e-16 },
-    Reached { case: "torus 72, gauss", value: 3e-15, gradient: 6e-15, normals: 1e-15, curvatures: 5e-15, laplacian: 1e-14, matrix: 1e-13, variance: 5e-16 },
-    Reached { case: "sphere 64, laplace", value: 5e-14, gradient: 2e-13, normals: 4e-15, curvatures: 4e-14, laplacian: 7e-13, matrix: 1e-10, variance: 2e-16 },
+const REACHED: [NumpyErrors; 4] = [
+    NumpyErrors { case: "ellipse 32, gauss", value: 8e-14, gradient: 2e-13, normals: 7e-14, curvatures: 3e-13, laplacian: 4e-13, matrix: 2e-9, variance: 1e-16 },
+    NumpyErrors { case: "sphere 64, gauss", value: 4e-14, gradient: 1e-13, normals: 2e-15, curvatures: 9e-15, laplacian: 3e-13, matrix: 4e-11, variance: 3e-16 },
+    NumpyErrors { case: "torus 72, gauss", value: 3e-15, gradient: 6e-15, normals: 1e-15, curvatures: 5e-15, laplacian: 1e-14, matrix: 1e-13, variance: 5e-16 },
+    NumpyErrors { case: "sphere 64, laplace", value: 5e-14, gradient: 2e-13, normals: 4e-15, curvatures: 4e-14, laplacian: 7e-13, matrix: 1e-10, variance: 2e-16 },
 ];
 
 /// Factor by which an error may exceed the one that was reached.
@@ -43,7 +43,7 @@ const ALLOWED: f64 = 10.0;
 /// A case of the reference with its fit.
 struct Case<'a> {
     expected: &'a Value,
-    reached: &'a Reached,
+    reached: &'a NumpyErrors,
     kernel: Kernel,
     alpha: f64,
     points: Cloud,
@@ -54,7 +54,7 @@ struct Case<'a> {
 }
 
 impl<'a> Case<'a> {
-    fn new(expected: &'a Value, reached: &'a Reached) -> Self {
+    fn new(expected: &'a Value, reached: &'a NumpyErrors) -> Self {
         let kernel = &expected["kernel"];
         let family = match kernel["family"].as_str().unwrap() {
             "gauss" => Family::Gauss,

@@ -11,7 +11,7 @@ use gramian_numerics::regression::function::deviations::JetDeviations;
 use gramian_numerics::regression::function::interpolant::Interpolant;
 use gramian_numerics::regression::function::local_kriging::{KrigingRequest, LocalKriging};
 use gramian_numerics::regression::function::posterior::variances;
-use gramian_numerics::regression::selection::{Noise, Observed, learn_mean};
+use gramian_numerics::regression::selection::{Noise, ObservedCloud, learn_mean};
 use gramian_numerics::regression::solver::trend::Mean;
 use gramian_numerics::regression::solver::{Solver, System};
 use gramian_numerics::regression::sums::jets::JetOrder;
@@ -93,7 +93,7 @@ fn what_is_not_known_of_the_mean_counts_as_in_the_dense_posterior() {
     let moving = LocalKriging::new(system(), sampling.clone(), &Unobserved).unwrap();
     for mean in [Mean::Constant, Mean::Linear] {
         let noise = Noise::Uniform(0.01);
-        let observed = Observed { cloud: &cloud, sampling: &sampling, values: &values, noise, mean };
+        let observed = ObservedCloud { cloud: &cloud, sampling: &sampling, values: &values, noise, mean };
         let trend = learn_mean(observed, &kernel, &Unobserved).unwrap().trend;
         let request = KrigingRequest {
             order: JetOrder::Hessian,

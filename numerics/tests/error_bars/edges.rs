@@ -281,7 +281,7 @@ impl Body {
 }
 
 /// Shares of flags and errors among the normals of a body with edges, in per cent.
-pub struct Answered {
+pub struct BodyShares {
     /// Points within a spacing of an edge with a flag.
     pub flagged: f64,
     /// Points there without one whose normal is off that of every face within a spacing, by more than three
@@ -292,7 +292,7 @@ pub struct Answered {
 }
 
 /// Asks for the normals of n random points of a body, with noise in spacings.
-pub fn body_answered(body: Body, n: usize, noise: f64) -> Answered {
+pub fn body_answered(body: Body, n: usize, noise: f64) -> BodyShares {
     let mut random = Random(5);
     let part = Part::of(body.faces(n), n, &mut random);
     let geometry = part.asked(noise, &mut random);
@@ -312,7 +312,7 @@ pub fn body_answered(body: Body, n: usize, noise: f64) -> Answered {
         100.0 * of.iter().filter(|at| is(**at)).count() as f64 / of.len() as f64
     };
     let is_flagged = |at: usize| reasons[at].is_some();
-    Answered {
+    BodyShares {
         flagged: share(&near, &is_flagged),
         wrong: share(&near, &is_wrong),
         far_flagged: share(&far, &is_flagged),
@@ -353,7 +353,7 @@ fn few_normals_at_edges_are_sure_and_wrong() {
     // Steps and ribs of a few points are off by more: docs/error-bars.md.
     for body in [Body::Cube, Body::Cylinder, Body::Cone] {
         for noise in [0.0, 0.02, 0.1] {
-            let Answered { flagged, wrong, far_flagged } = body_answered(body, 4_000, noise);
+            let BodyShares { flagged, wrong, far_flagged } = body_answered(body, 4_000, noise);
             // Exact points beside an edge have the right normal, mostly.
             assert!(flagged >= 15.0, "{body:?}, {noise}: {flagged} % have a flag");
             assert!(wrong <= 5.0, "{body:?}, {noise}: {wrong} % are sure and wrong");

@@ -16,7 +16,7 @@ const HALF: [f64; 3] = [1.0, 0.7, 0.5];
 const FILLET: f64 = 0.3;
 
 /// A point of the surface, with its distance to the next fillet if it lies on a plane.
-struct Placed {
+struct BoxPoint {
     position: [f64; 3],
     to_fillet: Option<f64>,
     part: usize,
@@ -30,7 +30,7 @@ const MEAN_CURVATURES: [f64; 3] = [0.0, 0.5 / FILLET, 1.0 / FILLET];
 const AREA: f64 = 12.4 + 8.29 + 1.13;
 
 /// Random points of a rounded box, uniform in area: points of a thin shell, moved onto the surface.
-fn rounded_box(n: usize, random: &mut Random) -> Vec<Placed> {
+fn rounded_box(n: usize, random: &mut Random) -> Vec<BoxPoint> {
     let mut points = Vec::with_capacity(n);
     while points.len() < n {
         let x = HALF.map(|half| (2.0 * random.uniform() - 1.0) * (half + 1.02 * FILLET));
@@ -44,7 +44,7 @@ fn rounded_box(n: usize, random: &mut Random) -> Vec<Placed> {
         let n_beyond = arm.iter().filter(|a| **a != 0.0).count();
         let within = (0..3).filter(|&c| arm[c] == 0.0).map(|c| HALF[c] - x[c].abs());
         let to_fillet = (n_beyond == 1).then(|| within.fold(f64::INFINITY, f64::min));
-        points.push(Placed { position, to_fillet, part: n_beyond - 1 });
+        points.push(BoxPoint { position, to_fillet, part: n_beyond - 1 });
     }
     points
 }
@@ -65,7 +65,7 @@ fn percent(n: usize, of: usize) -> f64 {
 }
 
 /// What a rounded box is answered.
-pub struct Answered {
+pub struct BoxShares {
     /// Mean curvatures within 1.96 deviations on planes, fillets and corners, per cent.
     pub covered: [f64; 3],
     /// Planes with a flag, farther than six spacings from the next fillet, per cent.
@@ -73,7 +73,7 @@ pub struct Answered {
 }
 
 /// Asks for the curvatures of n random points of a rounded box, with noise in spacings.
-pub fn rounded_box_answered(n: usize, noise: f64) -> Answered {
+pub fn rounded_box_answered(n: usize, noise: f64) -> BoxShares {
     let (mut random, spacing) = (Random(1), (AREA / n as f64).sqrt());
     let points = rounded_box(n, &mut random);
     let found = curvatures(points.iter().map(|of| of.position), noise * spacing, &mut random);
@@ -90,7 +90,7 @@ pub fn rounded_box_answered(n: usize, noise: f64) -> Answered {
     let is_far = |at: &usize| points[*at].to_fillet.is_some_and(|distance| distance > 6.0 * spacing);
     let far: Vec<usize> = (0..n).filter(|at| points[*at].part == PLANE && is_far(at)).collect();
     assert!(far.len() > n / 10, "{n}: {}", far.len());
-    Answered { covered, far_flagged: percent(far.iter().filter(|at| flagged[**at]).count(), far.len()) }
+    BoxShares { covered, far_flagged: percent(far.iter().filter(|at| flagged[**at]).count(), far.len()) }
 }
 
 #[test]
@@ -98,7 +98,7 @@ fn bars_cover_planes_fillets_and_corners() {
     // Per cent of the mean curvatures of exact points that must be covered, and with noise of a twentieth of
     // a spacing. They were 90, 79 and 72 with processes that are too smooth for jumps of curvature.
     for (noise, least) in [(0.0, [88.0; 3]), (0.05, [85.0, 80.0, 76.0])] {
-        let Answered { covered, far_flagged } = rounded_box_answered(6_000, noise);
+        let BoxShares { covered, far_flagged } = rounded_box_answered(6_000, noise);
         let are_covered = covered.iter().zip(least).all(|(found, least)| (least..99.5).contains(found));
         assert!(are_covered, "{noise}: {covered:?}");
         // All of them had a flag where there is noise: three deviations exceed half of a curvature of 0.
@@ -108,7 +108,7 @@ fn bars_cover_planes_fillets_and_corners() {
 
 #[test]
 fn planes_far_from_fillets_have_no_flag() {
-    let Answered { far_flagged, .. } = rounded_box_answered(20_000, 0.05);
+    let BoxShares { far_flagged, .. } = rounded_box_answered(20_000, 0.05);
     assert!(far_flagged <= 5.0, "{far_flagged}");
 }
 

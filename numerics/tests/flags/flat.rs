@@ -7,7 +7,7 @@ use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::surface::flags::FlagReason;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, Orientation, SurfaceModel};
 
-use super::clouds::{Oriented, cylinder, flat_square, graph, half_sphere};
+use super::clouds::{OrientedCloud, cylinder, flat_square, graph, half_sphere};
 use super::common::random::Random;
 use super::support::{cosines, geometry, n_wrong, surface, surface_of};
 
@@ -76,7 +76,7 @@ fn a_plane_with_a_bump_has_normals_on_one_side() {
 }
 
 /// Compares curvatures without a flag to exact ones for outward normals, relative to the larger exact one.
-fn check_curvatures(cloud: &Oriented, exact: [f64; 2], share_unflagged: f64, label: &str) {
+fn check_curvatures(cloud: &OrientedCloud, exact: [f64; 2], share_unflagged: f64, label: &str) {
     for (family, length_scale) in FAMILIES {
         let surface = surface_of(cloud, family, length_scale);
         let geometry = geometry(&surface, &CURVATURES);

@@ -3,13 +3,13 @@
 use gramian_numerics::kernel::Family;
 use gramian_numerics::surface::geometry::{GeometryRequest, SurfaceModel};
 
-use super::clouds::{Oriented, closed_curve, dumbbell, half_sphere, plate};
+use super::clouds::{OrientedCloud, closed_curve, dumbbell, half_sphere, plate};
 use super::support::{cosines, geometry, n_wrong, surface_of};
 
 const NORMALS: GeometryRequest = GeometryRequest { checks_curvatures: false, ..GeometryRequest::CURVATURES };
 
 fn n_wrong_signs(
-    cloud: &Oriented,
+    cloud: &OrientedCloud,
     family: Family,
     length_scale: f64,
     request: &GeometryRequest,

@@ -6,7 +6,7 @@ use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
 
-use super::clouds::Oriented;
+use super::clouds::OrientedCloud;
 use super::common::fits;
 
 pub fn surface(points: &[f64], dimension: usize, family: Family, length_scale: f64, alpha: f64) -> Surface {
@@ -14,7 +14,7 @@ pub fn surface(points: &[f64], dimension: usize, family: Family, length_scale: f
     fits::surface(&fits::factorize(&cloud, fits::kernel(family, length_scale), alpha))
 }
 
-pub fn surface_of(cloud: &Oriented, family: Family, length_scale: f64) -> Surface {
+pub fn surface_of(cloud: &OrientedCloud, family: Family, length_scale: f64) -> Surface {
     surface(&cloud.points, cloud.dimension, family, length_scale, 1e-10)
 }
 

@@ -8,7 +8,7 @@ use gramian_numerics::observer::Unobserved;
 use gramian_numerics::patches::{PatchGeometry, Patches};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
-use gramian_numerics::regression::selection::{Learned, Noise, Observed, learn};
+use gramian_numerics::regression::selection::{LearnedModel, Noise, ObservedCloud, learn};
 use gramian_numerics::regression::solver::trend::Mean;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
@@ -157,10 +157,10 @@ fn queries_that_are_points_have_the_deviations_of_points() {
     }
 }
 
-fn learned(cloud: &Cloud, values: &[f64]) -> Learned {
+fn learned(cloud: &Cloud, values: &[f64]) -> LearnedModel {
     let sampling = Sampling::of(cloud, &Unobserved).unwrap();
     let (noise, mean) = (Noise::Unknown, Mean::Constant);
-    learn(Observed { cloud, sampling: &sampling, values, noise, mean }, &Unobserved).unwrap()
+    learn(ObservedCloud { cloud, sampling: &sampling, values, noise, mean }, &Unobserved).unwrap()
 }
 
 #[test]

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use gramian_numerics::points::cloud::Cloud;
 
 use crate::common::random::Random;
-use crate::posterior::{By, Draw, Found, Posterior, posterior};
+use crate::posterior::{By, Draw, DrawSummary, Posterior, posterior};
 
 const N_QUERIES: usize = 300;
 
 /// Values with noise at random places of a square, some of whose rows are sent again.
 #[derive(Debug, Clone, Copy)]
-pub struct Repeated {
+pub struct RepeatedRows {
     pub n_points: usize,
     /// Standard deviation of the noise. That of the field is 0.7.
     pub noise: f64,
@@ -22,10 +22,10 @@ pub struct Repeated {
     pub by: By,
 }
 
-impl Repeated {
+impl RepeatedRows {
     /// Coverage of the 95 % bands, and root mean square error, over draws.
-    pub fn found(&self, n_draws: u64) -> Found {
-        Found::over((1..=n_draws).map(|draw| self.draw(draw)))
+    pub fn found(&self, n_draws: u64) -> DrawSummary {
+        DrawSummary::over((1..=n_draws).map(|draw| self.draw(draw)))
     }
 
     fn draw(&self, seed: u64) -> Draw {

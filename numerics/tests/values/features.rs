@@ -40,7 +40,7 @@ pub enum Feature {
 
 /// A field with its measurement: number of sensors and noise.
 #[derive(Debug, Clone, Copy)]
-pub struct Measured {
+pub struct MeasuredField {
     pub feature: Feature,
     pub n_points: usize,
     /// Standard deviation of the noise over that of the field.
@@ -67,7 +67,7 @@ impl Bands {
     }
 }
 
-impl Measured {
+impl MeasuredField {
     /// Means over seeds.
     pub fn bands(&self, by: By, n_seeds: usize) -> Bands {
         let mut sum = Bands::default();

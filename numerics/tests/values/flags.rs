@@ -9,12 +9,12 @@ use gramian_numerics::error::NumericsError;
 use gramian_numerics::kernel::defaults::{Purpose, default_fit};
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
-use gramian_numerics::operators::{Judged, Operator};
+use gramian_numerics::operators::{Operator, OperatorAnswers};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::noise::estimate_noise;
 use gramian_numerics::points::sampling::Sampling as Spacings;
 use gramian_numerics::regression::function::interpolant::Interpolant;
-use gramian_numerics::regression::selection::{Learned, Noise, Observed, learn};
+use gramian_numerics::regression::selection::{LearnedModel, Noise, ObservedCloud, learn};
 use gramian_numerics::regression::solver::trend::Mean;
 use gramian_numerics::regression::solver::{Solver, System};
 use gramian_numerics::regression::sums::regularization::Regularization;
@@ -30,7 +30,7 @@ use crate::sweep::{laplacian, tangential};
 
 /// The kernel that a request names.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Asked {
+pub enum KernelChoice {
     /// No kernel: all is learned or chosen by default.
     Nothing,
     /// A family without a length scale.
@@ -83,7 +83,7 @@ const ALPHA: f64 = 1e-10;
 
 impl Values {
     /// Counts the answers to each request, for `n_clouds` clouds. `[asked]`
-    pub fn run(&self, asked: &[Asked], n_clouds: usize) -> Vec<Counts> {
+    pub fn run(&self, asked: &[KernelChoice], n_clouds: usize) -> Vec<Counts> {
         let refused = Counts { n_refused: 1, ..Counts::default() };
         let mut sums = vec![Counts::default(); asked.len()];
         for cloud in 0..n_clouds {
@@ -103,7 +103,7 @@ struct OnCloud {
     queries: Cloud,
     spacings: Spacings,
     values: Vec<f64>,
-    learned: Learned,
+    learned: LearnedModel,
     truth: Vec<(Jet, Truth)>,
 }
 
@@ -120,27 +120,27 @@ impl OnCloud {
         let queries: Vec<[f64; 3]> = points.iter().step_by(n.div_ceil(MAX_QUERIES)).copied().collect();
         let spacings = Spacings::of(&cloud, &Unobserved)?;
         let (noise, mean) = (Noise::Unknown, Mean::Constant);
-        let observed = Observed { cloud: &cloud, sampling: &spacings, values: &values, noise, mean };
+        let observed = ObservedCloud { cloud: &cloud, sampling: &spacings, values: &values, noise, mean };
         let learned = learn(observed, &Unobserved)?;
         let truth = queries.iter().map(|&x| (of.field.at(x), of.shape.truth(x))).collect();
         let queries = Cloud::new(queries.concat(), 3).unwrap();
         Ok(Self { cloud, queries, spacings, values, learned, truth })
     }
 
-    fn counts(&self, asked: Asked) -> Result<Counts, NumericsError> {
+    fn counts(&self, asked: KernelChoice) -> Result<Counts, NumericsError> {
         let (interpolant, factor) = self.function(asked)?;
         let geometry =
             Geometry::of(&self.surface(asked)?, &self.queries, &GeometryRequest::CURVATURES, &Unobserved)?;
         let mut counts = Counts::default();
         let mut count = |operator: Operator, at: usize, exact: &[f64]| {
             let found = operator.apply(&geometry, &interpolant, &self.queries, &Unobserved)?;
-            let judged = Judged {
+            let judged = OperatorAnswers {
                 geometry: &geometry,
                 interpolant: &interpolant,
                 factor,
                 queries: &self.queries,
                 found: &found,
-                learned: Some(&self.learned).filter(|_| asked != Asked::Nothing),
+                learned: Some(&self.learned).filter(|_| asked != KernelChoice::Nothing),
             };
             let doubts = judged.judge(operator, &Unobserved)?;
             counts.add(at, &found, exact, &geometry, &doubts);
@@ -154,17 +154,17 @@ impl OnCloud {
     }
 
     /// The fit of the values, and the variance by which its unit kernel is multiplied.
-    fn function(&self, asked: Asked) -> Result<(Interpolant, f64), NumericsError> {
+    fn function(&self, asked: KernelChoice) -> Result<(Interpolant, f64), NumericsError> {
         let Self { cloud, spacings, values, learned, .. } = self;
         let (family, length_scale) = match asked {
-            Asked::Nothing => {
+            KernelChoice::Nothing => {
                 let kernel = Kernel::new(learned.family, learned.length_scale, 1.0)?;
                 let solver = solver(cloud, kernel, learned.ratio)?;
                 let interpolant = Interpolant::fit_with_mean(solver, values, Mean::Constant, &Unobserved)?;
                 return Ok((interpolant, learned.variance));
             }
-            Asked::Family(family) => (family, family.length_scale_of_values(spacings.scales())),
-            Asked::Width(family, factor) => {
+            KernelChoice::Family(family) => (family, family.length_scale_of_values(spacings.scales())),
+            KernelChoice::Width(family, factor) => {
                 (family, factor * family.length_scale_of_values(spacings.scales()))
             }
         };
@@ -172,16 +172,18 @@ impl OnCloud {
         Ok((Interpolant::fit(solver, values, &Unobserved)?, 1.0))
     }
 
-    fn surface(&self, asked: Asked) -> Result<Surface, NumericsError> {
+    fn surface(&self, asked: KernelChoice) -> Result<Surface, NumericsError> {
         let Self { cloud, spacings, .. } = self;
         let scales = spacings.scales();
         let (kernel, alpha) = match asked {
-            Asked::Nothing => {
+            KernelChoice::Nothing => {
                 let noise = estimate_noise(cloud, spacings, &Unobserved)?;
                 default_fit(scales, Purpose::Curvatures, || noise)?
             }
-            Asked::Family(family) => (Kernel::new(family, family.default_length_scale(scales), 1.0)?, ALPHA),
-            Asked::Width(family, factor) => {
+            KernelChoice::Family(family) => {
+                (Kernel::new(family, family.default_length_scale(scales), 1.0)?, ALPHA)
+            }
+            KernelChoice::Width(family, factor) => {
                 (Kernel::new(family, factor * family.length_scale_of_values(scales), 1.0)?, ALPHA)
             }
         };

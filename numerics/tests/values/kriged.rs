@@ -7,11 +7,11 @@ use std::sync::Arc;
 
 use gramian_numerics::kernel::Kernel;
 use gramian_numerics::observer::Unobserved;
-use gramian_numerics::operators::{Kriged, OfKriged, Operator};
+use gramian_numerics::operators::{KrigedFunction, OfKriged, Operator};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling as Spacings;
 use gramian_numerics::regression::function::local_kriging::LocalKriging;
-use gramian_numerics::regression::selection::{Learned, Noise, Observed, learn};
+use gramian_numerics::regression::selection::{LearnedModel, Noise, ObservedCloud, learn};
 use gramian_numerics::regression::solver::System;
 use gramian_numerics::regression::solver::trend::Mean;
 use gramian_numerics::regression::sums::regularization::Regularization;
@@ -54,7 +54,7 @@ const MAX_QUERIES: usize = 500;
 
 impl Case {
     /// Outcomes of the surface gradient and of Laplace–Beltrami, and the hyperparameters that were learned.
-    pub fn run(&self, draw: usize) -> ([Outcome; 2], Learned) {
+    pub fn run(&self, draw: usize) -> ([Outcome; 2], LearnedModel) {
         let mut random = Random((31 * self.n_points + 1001 * draw) as u64 + 5);
         let points = sample(self.shape, Sampling::Random, self.n_points, &mut random);
         let n = points.len();
@@ -68,7 +68,7 @@ impl Case {
         let sampling = Arc::new(Spacings::of(&cloud, &Unobserved).unwrap());
 
         let (noise, mean) = (Noise::Unknown, Mean::Constant);
-        let observed = Observed { cloud: &cloud, sampling: &sampling, values: &values, noise, mean };
+        let observed = ObservedCloud { cloud: &cloud, sampling: &sampling, values: &values, noise, mean };
         let learned = learn(observed, &Unobserved).unwrap();
         let kernel = Kernel::new(learned.family, learned.length_scale, 1.0).unwrap();
         let alpha = Regularization::uniform(learned.ratio).unwrap();
@@ -82,7 +82,7 @@ impl Case {
             ..GeometryRequest::CURVATURES
         };
         let geometry = Geometry::of(&surface, &at, &request, &Unobserved).unwrap();
-        let function = Kriged {
+        let function = KrigedFunction {
             moving: &moving,
             values: &values,
             trend: learned.trend.as_ref(),

@@ -17,10 +17,10 @@ mod posterior;
 mod sweep;
 mod tables;
 
-use copies::Repeated;
-use features::{Bands, Feature, Measured};
+use copies::RepeatedRows;
+use features::{Bands, Feature, MeasuredField};
 use fields::{FIELDS, Field};
-use flags::{Asked, Counts, Values};
+use flags::{Counts, KernelChoice, Values};
 use gramian_numerics::kernel::Family;
 use gramian_numerics::regression::selection::Criterion;
 use posterior::{By, Sensors};
@@ -88,10 +88,10 @@ fn sensors_have_posteriors_whose_bands_cover() {
 #[test]
 fn rows_that_repeat_change_neither_errors_nor_bars() {
     for (n_points, noise) in [(500, 0.3), (200, 0.1)] {
-        let plain = Repeated { n_points, noise, n_copies: 0, n_differing: 0, by: By::Default };
+        let plain = RepeatedRows { n_points, noise, n_copies: 0, n_differing: 0, by: By::Default };
         let repeats = [(0, 3), (0, 20), (10, 0), (10, 1), (50, 0), (50, 3), (200, 0), (200, 20)];
-        let case = |(n_copies, n_differing)| Repeated { n_copies, n_differing, ..plain };
-        let cases: Vec<Repeated> = std::iter::once((0, 0)).chain(repeats).map(case).collect();
+        let case = |(n_copies, n_differing)| RepeatedRows { n_copies, n_differing, ..plain };
+        let cases: Vec<RepeatedRows> = std::iter::once((0, 0)).chain(repeats).map(case).collect();
         let found: Vec<_> = cases.par_iter().map(|case| (case, case.found(10))).collect();
         let without = found[0].1.error;
         for (case, found) in found {
@@ -107,8 +107,8 @@ fn rows_that_repeat_change_neither_errors_nor_bars() {
 fn rows_that_repeat_change_no_search() {
     for criterion in [Criterion::MarginalLikelihood, Criterion::LeaveOneOut] {
         let by = By::Criterion(criterion);
-        let plain = Repeated { n_points: 150, noise: 0.1, n_copies: 0, n_differing: 0, by };
-        let case = |(n_copies, n_differing)| Repeated { n_copies, n_differing, ..plain };
+        let plain = RepeatedRows { n_points: 150, noise: 0.1, n_copies: 0, n_differing: 0, by };
+        let case = |(n_copies, n_differing)| RepeatedRows { n_copies, n_differing, ..plain };
         let cases = [(0, 0), (3, 0), (60, 0), (0, 20), (30, 3)].map(case);
         let found: Vec<_> = cases.par_iter().map(|case| (case, case.found(3))).collect();
         let without = found[0].1;
@@ -149,7 +149,7 @@ fn what_is_local_or_drowned_in_noise_is_learned() {
         (Feature::Draw(0.1), 1000, 0.1),
         (Feature::Clusters, 1000, 0.01),
     ];
-    let cases = cases.map(|(feature, n_points, noise)| Measured { feature, n_points, noise });
+    let cases = cases.map(|(feature, n_points, noise)| MeasuredField { feature, n_points, noise });
     let bands: Vec<Bands> = cases.par_iter().map(|case| case.bands(By::Default, 4)).collect();
     for (case, bands) in cases.iter().zip(bands) {
         // Of ten seeds 86 to 98 % are covered inside and at least 89 % everywhere. Four seeds scatter by some
@@ -175,9 +175,9 @@ fn detail_that_is_taken_for_noise_is_named() {
     ];
     // Noise that is as large as the field or larger is no detail.
     let noisy = [(Feature::Sine(3), 1.0), (Feature::Sine(2), 0.1), (Feature::Draw(0.3), 1.0)];
-    let ripples = ripples.map(|(feature, n_points)| Measured { feature, n_points, noise: 0.01 });
-    let noisy = noisy.map(|(feature, noise)| Measured { feature, n_points: 1000, noise });
-    let cases: Vec<Measured> = ripples.into_iter().chain(noisy).collect();
+    let ripples = ripples.map(|(feature, n_points)| MeasuredField { feature, n_points, noise: 0.01 });
+    let noisy = noisy.map(|(feature, noise)| MeasuredField { feature, n_points: 1000, noise });
+    let cases: Vec<MeasuredField> = ripples.into_iter().chain(noisy).collect();
     let bands: Vec<Bands> = cases.par_iter().map(|case| case.bands(By::Default, 6)).collect();
     let (of_ripples, of_noisy) = bands.split_at(ripples.len());
     for (case, bands) in ripples.iter().zip(of_ripples) {
@@ -193,11 +193,10 @@ fn operators_that_are_off_by_half_are_flagged_whatever_the_kernel() {
     let smooth = [Family::Gauss, Family::InverseMultiquadric, Family::Laplace { epsilon: 1.0 }];
     let rough = [Family::Matern { order: 1 }, Family::Matern { order: 2 }, Family::Matern { order: 4 }];
     let families = smooth.into_iter().chain(rough);
-    let mut asked = vec![Asked::Nothing];
-    asked
-        .extend(families.flat_map(|family| {
-            [Asked::Family(family), Asked::Width(family, 0.3), Asked::Width(family, 3.0)]
-        }));
+    let mut asked = vec![KernelChoice::Nothing];
+    asked.extend(families.flat_map(|family| {
+        [KernelChoice::Family(family), KernelChoice::Width(family, 0.3), KernelChoice::Width(family, 3.0)]
+    }));
     for noise in NOISES {
         let mut values = Vec::new();
         for shape in [Shape::Sphere, Shape::Torus, Shape::Wave] {

@@ -12,7 +12,7 @@ use gramian_numerics::points::sampling::Sampling as Spacings;
 use gramian_numerics::regression::function::interpolant::Interpolant;
 use gramian_numerics::regression::function::posterior::variances_with_mean;
 use gramian_numerics::regression::selection::{
-    Criterion, Hyperparameters, Learned, MAX_EVALUATIONS, Noise, Observations, Observed, Parameter,
+    Criterion, Hyperparameters, LearnedModel, MAX_EVALUATIONS, Noise, Observations, ObservedCloud, Parameter,
     ScalePrior, Selection, Variation, learn, select,
 };
 use gramian_numerics::regression::solver::trend::Mean;
@@ -48,7 +48,7 @@ pub enum By {
 
 /// Coverage and error over several draws.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Found {
+pub struct DrawSummary {
     /// Percentage of the true values within ±1.96 deviations.
     pub coverage: f64,
     /// Root mean square error over the spread of the field.
@@ -65,8 +65,8 @@ impl Sensors {
     }
 
     /// Coverage and error at random queries among the sensors, over several draws.
-    pub fn found(&self, by: By, n_draws: usize) -> Found {
-        Found::over((0..n_draws).map(|draw| self.draw(by, draw)))
+    pub fn found(&self, by: By, n_draws: usize) -> DrawSummary {
+        DrawSummary::over((0..n_draws).map(|draw| self.draw(by, draw)))
     }
 
     fn draw(&self, by: By, draw: usize) -> Draw {
@@ -113,7 +113,7 @@ impl Draw {
     }
 }
 
-impl Found {
+impl DrawSummary {
     pub fn over(draws: impl Iterator<Item = Draw>) -> Self {
         let sum = draws.fold((0, 0, 0.0), |(n, within, squares), draw| {
             (n + draw.n_queries, within + draw.n_within, squares + draw.squares)
@@ -133,7 +133,7 @@ pub struct Posterior {
 }
 
 pub fn posterior(by: By, cloud: Arc<Cloud>, values: &[f64], at: &Cloud) -> Posterior {
-    let Chosen { kernel, ratio, variance, is_contradicted, copies } = chosen(by, &cloud, values);
+    let LearnedProcess { kernel, ratio, variance, is_contradicted, copies } = chosen(by, &cloud, values);
     let (without, merge) = Merge::copies(&cloud, &copies);
     let (cloud, values) = (Arc::new(without), &merge.mean(values)[..]);
     let alpha = Regularization::uniform(ratio).unwrap();
@@ -147,7 +147,7 @@ pub fn posterior(by: By, cloud: Arc<Cloud>, values: &[f64], at: &Cloud) -> Poste
     Posterior { means, variances: variances.scaled(variance).latent, has_misfit }
 }
 
-struct Chosen {
+struct LearnedProcess {
     /// The kernel with variance 1.
     kernel: Kernel,
     /// Noise over variance.
@@ -158,15 +158,16 @@ struct Chosen {
     copies: Vec<RowCopy>,
 }
 
-fn chosen(by: By, cloud: &Cloud, values: &[f64]) -> Chosen {
+fn chosen(by: By, cloud: &Cloud, values: &[f64]) -> LearnedProcess {
     let sampling = Spacings::of(cloud, &Unobserved).unwrap();
     let (noise, mean) = (Noise::Unknown, Mean::Constant);
-    let learned = learn(Observed { cloud, sampling: &sampling, values, noise, mean }, &Unobserved).unwrap();
+    let learned =
+        learn(ObservedCloud { cloud, sampling: &sampling, values, noise, mean }, &Unobserved).unwrap();
     let By::Criterion(criterion) = by else {
         let kernel = learned.kernel(1.0).unwrap();
         let is_contradicted = learned.disagreement.as_ref().is_some_and(Disagreement::is_of_near_values);
-        let Learned { ratio, variance, copies, .. } = learned;
-        return Chosen { kernel, ratio, variance, is_contradicted, copies };
+        let LearnedModel { ratio, variance, copies, .. } = learned;
+        return LearnedProcess { kernel, ratio, variance, is_contradicted, copies };
     };
     let kernel = Kernel::new(learned.family, learned.length_scale, learned.variance).unwrap();
     let start = Hyperparameters::of(&kernel, Regularization::Uniform(learned.ratio * learned.variance));
@@ -196,5 +197,5 @@ fn chosen(by: By, cloud: &Cloud, values: &[f64]) -> Chosen {
     let kernel = Kernel::new(found.family, found.length_scales[0], 1.0).unwrap();
     // The least noise with which many points can be factorized.
     let ratio = (noise / found.variance).max(1e-10);
-    Chosen { kernel, ratio, variance: found.variance, is_contradicted: false, copies }
+    LearnedProcess { kernel, ratio, variance: found.variance, is_contradicted: false, copies }
 }

@@ -11,7 +11,7 @@ use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling as Spacings;
 use gramian_numerics::regression::function::deviations::JetDeviations;
 use gramian_numerics::regression::function::interpolant::Interpolant;
-use gramian_numerics::regression::selection::{Learned, Noise, Observed, learn};
+use gramian_numerics::regression::selection::{LearnedModel, Noise, ObservedCloud, learn};
 use gramian_numerics::regression::solver::trend::Mean;
 use gramian_numerics::regression::solver::{Solver, System};
 use gramian_numerics::regression::sums::jets::JetOrder;
@@ -62,7 +62,7 @@ pub struct Row {
     /// is at most a quarter of it.
     pub n_off: [usize; 5],
     pub n_unflagged: [usize; 5],
-    pub learned: Vec<Learned>,
+    pub learned: Vec<LearnedModel>,
 }
 
 impl Case {
@@ -90,7 +90,7 @@ impl Case {
         let at = Cloud::new(queries.concat(), 3).unwrap();
         let sampling = Arc::new(Spacings::of(&cloud, &Unobserved).unwrap());
 
-        let observed = Observed {
+        let observed = ObservedCloud {
             cloud: &cloud,
             sampling: &sampling,
             values: &values,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use gramian_numerics::points::cloud::Cloud;
 
 use crate::common::random::Random;
-use crate::posterior::{By, Draw, Found, Posterior, posterior};
+use crate::posterior::{By, Draw, DrawSummary, Posterior, posterior};
 
 const N_QUERIES: usize = 300;
 const N_COLUMNS: usize = 8;
@@ -23,8 +23,8 @@ pub struct Table {
 
 impl Table {
     /// Coverage of the 95 % bands, and root mean square error over the spread of the function, over draws.
-    pub fn found(&self, n_draws: u64) -> Found {
-        Found::over((1..=n_draws).map(|draw| self.draw(draw)))
+    pub fn found(&self, n_draws: u64) -> DrawSummary {
+        DrawSummary::over((1..=n_draws).map(|draw| self.draw(draw)))
     }
 
     fn draw(&self, seed: u64) -> Draw {

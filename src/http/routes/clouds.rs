@@ -23,11 +23,11 @@ use crate::http::state::app::CLOUD_HEADER;
 use crate::store::clouds::{CloudPage, ListedCloud, RegisteredCloud};
 use crate::store::key::CloudId;
 use crate::store::objects::cloud_object::CloudHead;
-use crate::store::objects::{ListWindow, Listed};
+use crate::store::objects::{CloudPlace, ListWindow};
 use gramian_host::compute::{Admission, JobObserver, Work};
 use gramian_host::memory::Owner;
 use gramian_host::operation::intake::read_body;
-use gramian_host::wire::etag::is_known;
+use gramian_host::wire::etag::if_none_match;
 use gramian_host::wire::negotiation::BodyFormat;
 use gramian_host::wire::read::members::present_unless_empty;
 use gramian_host::wire::read::points::Points;
@@ -218,7 +218,7 @@ pub async fn get_cloud(
 ) -> Result<Response, Problem> {
     let stored = find(&app, owner, &cloud_id).await?;
     let etag = etag_of(&stored);
-    if is_known(&headers, &etag) {
+    if if_none_match(&headers, &etag) {
         return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, etag)]).into_response());
     }
     if stored.scales().is_none() {
@@ -254,7 +254,7 @@ pub async fn check_cloud(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let etag = etag_of(find(&app, owner, &cloud_id).await?.as_ref());
-    let status = if is_known(&headers, &etag) { StatusCode::NOT_MODIFIED } else { StatusCode::OK };
+    let status = if if_none_match(&headers, &etag) { StatusCode::NOT_MODIFIED } else { StatusCode::OK };
     let json = HeaderValue::from_static("application/json");
     let mut response = (status, [(header::ETAG, etag)]).into_response();
     response.headers_mut().insert(header::CONTENT_TYPE, json);
@@ -321,7 +321,7 @@ fn held(app: &App, owner: Owner, answer: Response) -> Result<Response, Problem> 
 /// The place of the last cloud of a page in the order of the list. Opaque to clients.
 ///
 /// A cursor stays valid after its cloud was deleted.
-struct Cursor(Listed);
+struct Cursor(CloudPlace);
 
 impl Cursor {
     /// Parses a cursor that matches the pattern in the OpenAPI document.
@@ -335,7 +335,7 @@ impl Cursor {
         // A time beyond u64 nanoseconds lies behind all clouds, so its page is empty.
         let nanoseconds = u64::try_from(nanoseconds).unwrap_or(u64::MAX);
         let since = SystemTime::UNIX_EPOCH + Duration::from_nanos(nanoseconds);
-        Some(Self(Listed { since, id: CloudId::parse(id)? }))
+        Some(Self(CloudPlace { since, id: CloudId::parse(id)? }))
     }
 }
 

@@ -13,9 +13,9 @@ use gramian_numerics::model::{FittedValues, Model};
 use gramian_numerics::observer::WithoutStages;
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::regression::function::interpolant::Interpolant;
-use gramian_numerics::regression::selection::{Learned, Noise, Observed, learn, learn_alike};
+use gramian_numerics::regression::selection::{LearnedModel, Noise, ObservedCloud, learn, learn_alike};
 use gramian_numerics::regression::solver::trend::Mean;
-use gramian_numerics::regression::solver::{Known, Solution};
+use gramian_numerics::regression::solver::{EarlierSolutions, Solution};
 use gramian_numerics::surface::Surface;
 
 /// The fits of one request.
@@ -84,7 +84,7 @@ impl Fits {
     pub(super) fn with_known_weights<T>(
         &self,
         values: ValuesKey,
-        solve: impl FnOnce(Known) -> Result<T, NumericsError>,
+        solve: impl FnOnce(EarlierSolutions) -> Result<T, NumericsError>,
         solution: impl FnOnce(&T) -> Option<&Arc<Solution>>,
     ) -> Result<T, Problem> {
         let key = self.main.plan.key;
@@ -106,7 +106,7 @@ impl Fits {
         &self,
         values: &[f64],
         observer: &JobObserver,
-    ) -> Result<Option<Learned>, NumericsError> {
+    ) -> Result<Option<LearnedModel>, NumericsError> {
         let FitPlan { stored, fitted, merge, recipe, process, .. } = &self.main.plan;
         if process.is_learned {
             return Ok(None);
@@ -122,7 +122,7 @@ impl Fits {
         };
         let values = &self.main.plan.merged(values);
         let (noise, mean) = (Noise::Unknown, Mean::Constant);
-        let observed = Observed { cloud, sampling: &sampling, values, noise, mean };
+        let observed = ObservedCloud { cloud, sampling: &sampling, values, noise, mean };
         let learn = if stretched.is_some() { learn_alike } else { learn };
         learn(observed, &observer).map(Some)
     }

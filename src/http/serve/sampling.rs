@@ -11,7 +11,7 @@ use gramian_host::compute::{Admission, JobObserver};
 use gramian_numerics::error::NumericsError;
 use gramian_numerics::points::noise::{estimate_noise, noise_flops};
 use gramian_numerics::points::sampling::{Sampling, sampling_flops};
-use gramian_numerics::regression::selection::{Learned, learning_price};
+use gramian_numerics::regression::selection::{LearnedModel, learning_price};
 
 /// Finds the facts about cloud or values that a fit lacks.
 ///
@@ -50,7 +50,7 @@ async fn find_learned(
     fit: &PlannedValues,
     values: Arc<Values>,
     sampling: Arc<Sampling>,
-) -> Result<Arc<Learned>, Problem> {
+) -> Result<Arc<LearnedModel>, Problem> {
     let (key, cloud) = (values.learned_key, &fit.on.stored.cloud);
     let price = learning_price(cloud, values.n_lists);
     let asked = fit.learning(values, sampling)?;

@@ -28,7 +28,7 @@ use crate::store::key::CloudId;
 use crate::store::objects::cloud_object::StoredCloud;
 use crate::store::objects::{CloudObjects, Written};
 use gramian_host::memory::Owner;
-use gramian_host::store::{Damaged, OwnerName, Unavailable};
+use gramian_host::store::{DamagedObject, OwnerName, Unavailable};
 
 /// An owner of clouds, by its number in this process and by its name in the store.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -39,7 +39,7 @@ pub struct Holder {
 
 /// Outcome of an attempt to keep a cloud beyond the process.
 #[derive(Debug)]
-pub enum Kept {
+pub enum StoreOutcome {
     /// The cloud is new to the store and takes this many bytes there.
     Written(u64),
     /// The cloud was kept already.
@@ -53,7 +53,7 @@ pub enum Kept {
 }
 
 /// Outcome of a look-up in memory, after a check with the store if one was due.
-pub enum Recalled {
+pub enum CloudLookup {
     LocalJob(Arc<RegisteredCloud>),
     /// The cloud was in memory but is no longer in the store.
     Gone,
@@ -68,20 +68,20 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         holder: &Holder,
         cloud: &Arc<RegisteredCloud>,
         encode: impl FnOnce() -> F,
-    ) -> Kept
+    ) -> StoreOutcome
     where
         F: Future<Output = Result<Vec<Bytes>, String>>,
     {
         let _turn = self.turns.take((holder.owner, cloud.id)).await;
         let is_known = match cloud.standing() {
-            Standing::Deleted => return Kept::Deleted,
+            Standing::Deleted => return StoreOutcome::Deleted,
             Standing::Unwritten => false,
             Standing::Pending => self.has(holder.owner, cloud),
             // Another process may have deleted it.
             Standing::Stored { .. } => is_still_stored(objects, holder, cloud).await,
         };
         if is_known {
-            return Kept::Known;
+            return StoreOutcome::Known;
         }
         if cloud.is_stored() {
             cloud.set_unwritten();
@@ -91,7 +91,11 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
             Err(reason) => {
                 // The mark comes before the check, because memory never evicts a pending cloud.
                 cloud.set_pending();
-                if self.has(holder.owner, cloud) { Kept::Pending(reason) } else { Kept::Nowhere(reason) }
+                if self.has(holder.owner, cloud) {
+                    StoreOutcome::Pending(reason)
+                } else {
+                    StoreOutcome::Nowhere(reason)
+                }
             }
         }
     }
@@ -103,7 +107,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         holder: &Holder,
         cloud: &Arc<RegisteredCloud>,
         encode: impl FnOnce() -> F,
-    ) -> Option<Kept>
+    ) -> Option<StoreOutcome>
     where
         F: Future<Output = Result<Vec<Bytes>, String>>,
     {
@@ -111,7 +115,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         if !cloud.is_pending() || !self.has(holder.owner, cloud) {
             return None;
         }
-        Some(write(objects, holder, cloud, encode).await.unwrap_or_else(Kept::Pending))
+        Some(write(objects, holder, cloud, encode).await.unwrap_or_else(StoreOutcome::Pending))
     }
 
     /// Finds a cloud in memory. The store is asked first if the cloud was last seen there `trust` ago or
@@ -122,19 +126,19 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         holder: &Holder,
         id: CloudId,
         trust: Duration,
-    ) -> Recalled {
-        let Some(cloud) = self.get(holder.owner, id) else { return Recalled::Unknown };
+    ) -> CloudLookup {
+        let Some(cloud) = self.get(holder.owner, id) else { return CloudLookup::Unknown };
         if cloud.is_trusted(trust) {
-            return Recalled::LocalJob(cloud);
+            return CloudLookup::LocalJob(cloud);
         }
         let _turn = self.turns.take((holder.owner, id)).await;
         // Other tasks may have asked about it, or changed it, before this turn.
-        let Some(cloud) = self.get(holder.owner, id) else { return Recalled::Unknown };
+        let Some(cloud) = self.get(holder.owner, id) else { return CloudLookup::Unknown };
         if cloud.is_trusted(trust) || is_still_stored(objects, holder, &cloud).await {
-            return Recalled::LocalJob(cloud);
+            return CloudLookup::LocalJob(cloud);
         }
         self.clouds.remove(holder.owner, &id);
-        Recalled::Gone
+        CloudLookup::Gone
     }
 
     /// Takes a cloud that was read from the store into memory, unless it was deleted meanwhile. A damaged
@@ -147,7 +151,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         objects: &CloudObjects,
         holder: &Holder,
         id: CloudId,
-        read: Result<StoredCloud, Damaged>,
+        read: Result<StoredCloud, DamagedObject>,
     ) -> Result<Option<Arc<RegisteredCloud>>, Unavailable> {
         let _turn = self.turns.take((holder.owner, id)).await;
         if let Some(cloud) = self.get(holder.owner, id) {
@@ -173,7 +177,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         objects: &CloudObjects,
         holder: &Holder,
         id: CloudId,
-        damaged: Damaged,
+        damaged: DamagedObject,
     ) {
         let _turn = self.turns.take((holder.owner, id)).await;
         objects.put_aside(&holder.name, id, damaged).await;
@@ -227,7 +231,7 @@ async fn write<F>(
     holder: &Holder,
     cloud: &RegisteredCloud,
     encode: impl FnOnce() -> F,
-) -> Result<Kept, String>
+) -> Result<StoreOutcome, String>
 where
     F: Future<Output = Result<Vec<Bytes>, String>>,
 {
@@ -237,11 +241,11 @@ where
     match written.map_err(|error| error.to_string())? {
         Written::Now => {
             cloud.set_stored(cloud.created_at());
-            Ok(Kept::Written(n_bytes))
+            Ok(StoreOutcome::Written(n_bytes))
         }
         Written::Before(since) => {
             cloud.set_stored(since);
-            Ok(Kept::Known)
+            Ok(StoreOutcome::Known)
         }
     }
 }

@@ -11,7 +11,7 @@ mod turns;
 use std::sync::{Arc, OnceLock};
 
 use super::key::CloudId;
-pub use durable::{Holder, Kept, Recalled};
+pub use durable::{CloudLookup, Holder, StoreOutcome};
 use gramian_host::memory::Owner;
 use gramian_host::memory::fair_cache::{Counts, FairCache};
 use gramian_host::memory::single_flight::{Boarding, SingleFlight};

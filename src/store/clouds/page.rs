@@ -7,7 +7,7 @@ use std::time::SystemTime;
 use super::{CloudStore, Holder, RegisteredCloud};
 use crate::store::key::CloudId;
 use crate::store::objects::cloud_object::CloudHead;
-use crate::store::objects::{CloudObjects, ListWindow, Listed};
+use crate::store::objects::{CloudObjects, CloudPlace, ListWindow};
 use gramian_host::memory::Owner;
 use gramian_host::store::Unavailable;
 
@@ -21,7 +21,7 @@ pub enum ListedCloud {
 pub struct CloudPage {
     pub clouds: Vec<ListedCloud>,
     /// The place after which the next page begins. `None` on the last page.
-    pub next: Option<Listed>,
+    pub next: Option<CloudPlace>,
 }
 
 impl ListedCloud {
@@ -42,8 +42,8 @@ impl ListedCloud {
 
 impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     /// Places of [`CloudStore::unstored`] clouds in the list, by id.
-    pub fn unstored_places(&self, owner: Owner) -> HashMap<CloudId, Listed> {
-        let place = |cloud: &RegisteredCloud| Listed { since: cloud.created_at(), id: cloud.id };
+    pub fn unstored_places(&self, owner: Owner) -> HashMap<CloudId, CloudPlace> {
+        let place = |cloud: &RegisteredCloud| CloudPlace { since: cloud.created_at(), id: cloud.id };
         self.unstored(owner).iter().map(|cloud| (cloud.id, place(cloud))).collect()
     }
 
@@ -59,7 +59,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         objects: Option<&CloudObjects>,
         holder: &Holder,
         mut window: ListWindow,
-        unstored: HashMap<CloudId, Listed>,
+        unstored: HashMap<CloudId, CloudPlace>,
     ) -> Result<CloudPage, Unavailable> {
         loop {
             let (places, is_last) = match objects {
@@ -81,7 +81,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         &self,
         objects: Option<&CloudObjects>,
         holder: &Holder,
-        places: &[Listed],
+        places: &[CloudPlace],
     ) -> Result<Vec<ListedCloud>, Unavailable> {
         let (mut found, mut elsewhere) = (Vec::new(), Vec::new());
         // A cloud that was deleted and posted again during the listing appears twice in a directory.

@@ -21,7 +21,7 @@ use std::time::{Duration, SystemTime};
 use bytes::Bytes;
 
 use crate::store::key::CloudId;
-use gramian_host::store::Damaged;
+use gramian_host::store::DamagedObject;
 use gramian_numerics::points::cloud::Cloud;
 
 const MAGIC: &[u8; 16] = b"gramian cloud 1\n";
@@ -89,25 +89,26 @@ impl CloudHead {
     /// Reads the head of an object from its first bytes, however many are given.
     ///
     /// # Errors
-    /// [`Damaged`] if the bytes are not a head, or not as written.
-    pub(super) fn decode(bytes: &[u8]) -> Result<Self, Damaged> {
-        let rest = bytes.strip_prefix(MAGIC).ok_or(Damaged("it does not start like a cloud"))?;
-        let counts = rest.get(..8 * N_COUNTS).ok_or(CUT)?;
+    /// [`DamagedObject`] if the bytes are not a head, or not as written.
+    pub(super) fn decode(bytes: &[u8]) -> Result<Self, DamagedObject> {
+        let rest = bytes.strip_prefix(MAGIC).ok_or(DamagedObject("it does not start like a cloud"))?;
+        let counts = rest.get(..8 * N_COUNTS).ok_or(TRUNCATED)?;
         let mut counts =
             counts.chunks_exact(8).map(|word| u64::from_le_bytes(word.try_into().unwrap_or_default()));
         let mut next = || counts.next().unwrap_or_default();
         let (nanoseconds, n_points, dimension, has_normals, n_duplicates) =
             (next(), next(), next(), next(), next());
-        let count = |x: u64| usize::try_from(x).map_err(|_| Damaged("a number does not fit this machine"));
+        let count =
+            |x: u64| usize::try_from(x).map_err(|_| DamagedObject("a number does not fit this machine"));
         let (n_points, dimension) = (count(n_points)?, count(dimension)?);
         // Nothing is built from the numbers before their hash is checked.
         if dimension > bytes.len() {
-            return Err(CUT);
+            return Err(TRUNCATED);
         }
-        let head = bytes.get(..head_bytes(dimension)).ok_or(CUT)?;
+        let head = bytes.get(..head_bytes(dimension)).ok_or(TRUNCATED)?;
         let (head, hash) = head.split_at(head.len() - HASH_BYTES);
         if blake3::hash(head).as_bytes() != hash {
-            return Err(OTHER);
+            return Err(WRONG_CHECKSUM);
         }
         let box_of = floats(&head[MAGIC.len() + 8 * N_COUNTS..]);
         let (least, greatest) = box_of.split_at(dimension);
@@ -122,10 +123,10 @@ impl CloudHead {
     }
 }
 
-pub(super) const CUT: Damaged = Damaged("it is truncated");
-const OTHER: Damaged = Damaged("its checksum does not match");
-const NO_CLOUD: Damaged = Damaged("its numbers do not form a cloud");
-const ANOTHER: Damaged = Damaged("its name is that of another cloud");
+pub(super) const TRUNCATED: DamagedObject = DamagedObject("it is truncated");
+const WRONG_CHECKSUM: DamagedObject = DamagedObject("its checksum does not match");
+const NOT_A_CLOUD: DamagedObject = DamagedObject("its numbers do not form a cloud");
+const OTHER_CLOUD: DamagedObject = DamagedObject("its name is that of another cloud");
 
 /// Encodes a cloud as the pieces of its object. The numbers are shared with the cloud, not copied.
 pub fn encode(cloud: StoredCloud) -> Vec<Bytes> {
@@ -191,11 +192,11 @@ impl Check {
     /// Ends the check.
     ///
     /// # Errors
-    /// [`Damaged`] unless all bytes are those that were written.
-    pub(super) fn end(self) -> Result<(), Damaged> {
+    /// [`DamagedObject`] unless all bytes are those that were written.
+    pub(super) fn end(self) -> Result<(), DamagedObject> {
         match () {
-            () if !self.is_as_long || self.at != self.numbers.end + HASH_BYTES => Err(CUT),
-            () if self.hasher.finalize().as_bytes()[..] != self.hash => Err(OTHER),
+            () if !self.is_as_long || self.at != self.numbers.end + HASH_BYTES => Err(TRUNCATED),
+            () if self.hasher.finalize().as_bytes()[..] != self.hash => Err(WRONG_CHECKSUM),
             () => Ok(()),
         }
     }
@@ -203,31 +204,31 @@ impl Check {
 
 /// Returns whether the bytes differ from those written. Otherwise they are intact, but encode no cloud or
 /// another one.
-pub(super) fn is_of_bytes(damaged: Damaged) -> bool {
-    damaged != NO_CLOUD && damaged != ANOTHER
+pub(super) fn is_of_bytes(damaged: DamagedObject) -> bool {
+    damaged != NOT_A_CLOUD && damaged != OTHER_CLOUD
 }
 
 /// Reads the cloud `id` from its object.
 ///
 /// # Errors
-/// [`Damaged`] unless the object is complete and as written.
-pub fn decode(id: CloudId, bytes: &[u8]) -> Result<StoredCloud, Damaged> {
+/// [`DamagedObject`] unless the object is complete and as written.
+pub fn decode(id: CloudId, bytes: &[u8]) -> Result<StoredCloud, DamagedObject> {
     let head = CloudHead::decode(bytes)?;
     if object_bytes(&head) != Some(bytes.len()) {
-        return Err(CUT);
+        return Err(TRUNCATED);
     }
     let (rest, hash) = bytes.split_at(bytes.len() - HASH_BYTES);
     let numbers = &rest[head_bytes(head.dimension)..];
     if blake3::hash(numbers).as_bytes() != hash {
-        return Err(OTHER);
+        return Err(WRONG_CHECKSUM);
     }
     let (points, normals) = numbers.split_at(8 * head.n_points * head.dimension);
     let cloud_of =
-        |bytes: &[u8]| Cloud::new(floats(bytes), head.dimension).map(Arc::new).map_err(|_| NO_CLOUD);
+        |bytes: &[u8]| Cloud::new(floats(bytes), head.dimension).map(Arc::new).map_err(|_| NOT_A_CLOUD);
     let points = cloud_of(points)?;
     let normals = head.has_normals.then(|| cloud_of(normals)).transpose()?;
     if CloudId::of(&points, normals.as_deref()) != id {
-        return Err(ANOTHER);
+        return Err(OTHER_CLOUD);
     }
     Ok(StoredCloud { head, points, normals })
 }
@@ -273,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn every_other_byte_and_every_other_length_is_refused() {
+    fn any_changed_byte_or_length_is_refused() {
         let (id, cloud) = stored(true);
         let bytes = encode(cloud).concat();
         for at in 0..bytes.len() {
@@ -286,6 +287,6 @@ mod tests {
         }
         assert!(decode(id, &[&bytes[..], &[0]].concat()).is_err());
         let name = stored(false).0;
-        assert_eq!(decode(name, &bytes).err(), Some(Damaged("its name is that of another cloud")));
+        assert_eq!(decode(name, &bytes).err(), Some(DamagedObject("its name is that of another cloud")));
     }
 }

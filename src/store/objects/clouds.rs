@@ -15,7 +15,7 @@ use object_store::{GetOptions, GetRange, ObjectMeta, ObjectStoreExt, PutPayload}
 use super::CloudObjects;
 use super::cloud_object::{self, CloudHead};
 use crate::store::key::CloudId;
-use gramian_host::store::{Damaged, OwnerName, Unavailable, Verb};
+use gramian_host::store::{DamagedObject, OwnerName, Unavailable, Verb};
 
 /// Number of heads read concurrently.
 const HEADS_AT_ONCE: usize = 32;
@@ -30,7 +30,7 @@ pub(super) const FOLDER: &str = "clouds";
 
 /// A place in a list of clouds. Places are ordered by time, ties by id.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Listed {
+pub struct CloudPlace {
     /// Time at which the store took the cloud, to the precision of the store. For a cloud in memory alone:
     /// its time of registration.
     pub since: SystemTime,
@@ -40,7 +40,7 @@ pub struct Listed {
 /// A window of a list: at most `n` places, after a given one if any.
 #[derive(Debug, Clone, Copy)]
 pub struct ListWindow {
-    pub after: Option<Listed>,
+    pub after: Option<CloudPlace>,
     pub n: usize,
 }
 
@@ -49,11 +49,11 @@ pub struct ListWindow {
 struct FirstPlaces {
     window: ListWindow,
     /// Up to `n + 1` places. The extra one tells that the window is not the last.
-    first: BTreeSet<Listed>,
+    first: BTreeSet<CloudPlace>,
 }
 
 impl FirstPlaces {
-    fn add(&mut self, place: Listed) {
+    fn add(&mut self, place: CloudPlace) {
         if self.window.after.is_none_or(|last| place > last) {
             self.first.insert(place);
         }
@@ -62,7 +62,7 @@ impl FirstPlaces {
         }
     }
 
-    fn into_places(self) -> (Vec<Listed>, bool) {
+    fn into_places(self) -> (Vec<CloudPlace>, bool) {
         let is_last = self.first.len() <= self.window.n;
         (self.first.into_iter().take(self.window.n).collect(), is_last)
     }
@@ -74,7 +74,7 @@ impl ListWindow {
     }
 
     /// Returns the places of this window among some, in order, and whether they are the last.
-    pub fn first_of(self, places: impl Iterator<Item = Listed>) -> (Vec<Listed>, bool) {
+    pub fn first_of(self, places: impl Iterator<Item = CloudPlace>) -> (Vec<CloudPlace>, bool) {
         let mut first = self.begin();
         places.for_each(|place| first.add(place));
         first.into_places()
@@ -144,7 +144,7 @@ impl CloudObjects {
         &self,
         owner: &OwnerName,
         id: CloudId,
-    ) -> Result<Option<Result<CloudHead, Damaged>>, Unavailable> {
+    ) -> Result<Option<Result<CloudHead, DamagedObject>>, Unavailable> {
         let first = self.first_bytes(&self.cloud(owner, id)).await?;
         Ok(first.map(|bytes| CloudHead::decode(&bytes)))
     }
@@ -166,7 +166,7 @@ impl CloudObjects {
         &self,
         owner: &OwnerName,
         id: CloudId,
-    ) -> Result<Option<Result<CloudHead, Damaged>>, Unavailable> {
+    ) -> Result<Option<Result<CloudHead, DamagedObject>>, Unavailable> {
         let head = match self.head(owner, id).await? {
             None => return Ok(None),
             Some(Err(damaged)) => return Ok(Some(Err(damaged))),
@@ -193,7 +193,7 @@ impl CloudObjects {
         &self,
         owner: &OwnerName,
         ids: Vec<CloudId>,
-    ) -> Result<Vec<(CloudId, Result<CloudHead, Damaged>)>, Unavailable> {
+    ) -> Result<Vec<(CloudId, Result<CloudHead, DamagedObject>)>, Unavailable> {
         let heads = futures_util::stream::iter(ids)
             .map(|id| async move { Ok(self.head(owner, id).await?.map(|head| (id, head))) })
             .buffered(HEADS_AT_ONCE);
@@ -212,12 +212,12 @@ impl CloudObjects {
         &self,
         owner: &OwnerName,
         window: ListWindow,
-        mut unstored: HashMap<CloudId, Listed>,
-    ) -> Result<(Vec<Listed>, bool), Unavailable> {
+        mut unstored: HashMap<CloudId, CloudPlace>,
+    ) -> Result<(Vec<CloudPlace>, bool), Unavailable> {
         let folder = self.path(&[&owner.0, FOLDER]);
         let (mut first, mut names) = (window.begin(), self.backend().list(Some(&folder)));
         while let Some(object) = self.counted_item(&folder, names.next().await)? {
-            let Some(place) = Listed::of(&object) else { continue };
+            let Some(place) = CloudPlace::of(&object) else { continue };
             unstored.remove(&place.id);
             first.add(place);
         }
@@ -265,7 +265,7 @@ impl CloudObjects {
     ///
     /// # Errors
     /// [`Unavailable`].
-    pub(super) async fn let_go(&self, owner: &OwnerName, place: Listed) -> Result<bool, Unavailable> {
+    pub(super) async fn let_go(&self, owner: &OwnerName, place: CloudPlace) -> Result<bool, Unavailable> {
         let name = self.cloud(owner, place.id);
         let found = self.counted(Verb::Find, &name, self.backend().head(&name).await)?;
         // Buckets tell the time of one object by the second, and that of objects in a list more precisely.
@@ -275,7 +275,7 @@ impl CloudObjects {
     }
 
     /// Moves a damaged cloud aside, unless it has been written again meanwhile.
-    pub async fn put_aside(&self, owner: &OwnerName, id: CloudId, damaged: Damaged) {
+    pub async fn put_aside(&self, owner: &OwnerName, id: CloudId, damaged: DamagedObject) {
         if cloud_object::is_of_bytes(damaged) && matches!(self.check(owner, id).await, Ok(Some(Ok(_)))) {
             return;
         }
@@ -315,7 +315,7 @@ impl CloudObjects {
     }
 }
 
-impl Listed {
+impl CloudPlace {
     /// Returns the place of an object in the list, if it is a cloud.
     pub(super) fn of(object: &ObjectMeta) -> Option<Self> {
         let id = CloudId::parse(object.location.filename()?)?;

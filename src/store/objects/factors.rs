@@ -20,7 +20,7 @@ use super::CloudObjects;
 use crate::store::key::CloudId;
 use gramian_host::store::AT_WORK;
 use gramian_host::store::room::Room;
-use gramian_host::store::{Damaged, OwnerName, Unavailable, Verb};
+use gramian_host::store::{DamagedObject, OwnerName, Unavailable, Verb};
 
 const FOLDER: &str = "factors";
 
@@ -122,7 +122,7 @@ impl CloudObjects {
     }
 
     /// Deletes a damaged factor.
-    pub async fn drop_factor(&self, name: &FactorName, damaged: Damaged) {
+    pub async fn drop_factor(&self, name: &FactorName, damaged: DamagedObject) {
         let path = self.factor(name);
         self.count_damaged();
         let is_gone = self.delete(&path).await.is_ok();

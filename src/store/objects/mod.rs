@@ -21,7 +21,7 @@ mod tests;
 use std::ops::Deref;
 use std::sync::Arc;
 
-pub use clouds::{ListWindow, Listed, Written};
+pub use clouds::{CloudPlace, ListWindow, Written};
 use gramian_host::store::Objects;
 pub use retention::{Retention, Swept};
 

@@ -8,7 +8,7 @@ use std::time::{Duration, SystemTime};
 use object_store::ObjectMeta;
 
 use super::clouds::FOLDER;
-use super::{CloudObjects, Listed};
+use super::{CloudObjects, CloudPlace};
 use crate::store::key::CloudId;
 use gramian_host::store::{OwnerName, Unavailable};
 
@@ -36,27 +36,27 @@ pub struct Swept {
     pub gone: Vec<(OwnerName, CloudId)>,
 }
 
-struct Kept {
-    listed: Listed,
+struct OwnedCloud {
+    listed: CloudPlace,
     n_bytes: u64,
 }
 
 /// Clouds of an owner, the oldest first.
 struct Holding {
     owner: OwnerName,
-    clouds: VecDeque<Kept>,
+    clouds: VecDeque<OwnedCloud>,
     n_bytes: u64,
 }
 
 impl Holding {
-    fn new(owner: OwnerName, mut clouds: Vec<Kept>) -> Self {
+    fn new(owner: OwnerName, mut clouds: Vec<OwnedCloud>) -> Self {
         clouds.sort_by_key(|cloud| cloud.listed);
         let n_bytes = clouds.iter().map(|cloud| cloud.n_bytes).sum();
         Self { owner, clouds: clouds.into(), n_bytes }
     }
 
-    fn pop_oldest(&mut self) -> Option<Listed> {
-        let Kept { listed, n_bytes } = self.clouds.pop_front()?;
+    fn pop_oldest(&mut self) -> Option<CloudPlace> {
+        let OwnedCloud { listed, n_bytes } = self.clouds.pop_front()?;
         self.n_bytes -= n_bytes;
         Some(listed)
     }
@@ -69,8 +69,12 @@ impl Holding {
 /// Removes and returns the next cloud to delete, if any. First come clouds that are too old. Beyond the byte
 /// limit it is the oldest of the owner who holds most. So no owner loses clouds within an equal share to
 /// another.
-fn next_to_go(holdings: &mut [Holding], limits: Retention, now: SystemTime) -> Option<(OwnerName, Listed)> {
-    let is_too_old = |cloud: &Kept| {
+fn next_to_go(
+    holdings: &mut [Holding],
+    limits: Retention,
+    now: SystemTime,
+) -> Option<(OwnerName, CloudPlace)> {
+    let is_too_old = |cloud: &OwnedCloud| {
         let age = now.duration_since(cloud.listed.since).unwrap_or_default();
         limits.age.is_some_and(|most| age > most)
     };
@@ -115,9 +119,10 @@ impl CloudObjects {
     }
 
     /// Clouds of an owner with their sizes.
-    async fn kept(&self, owner: &OwnerName) -> Result<Vec<Kept>, Unavailable> {
+    async fn kept(&self, owner: &OwnerName) -> Result<Vec<OwnedCloud>, Unavailable> {
         let found = self.objects_in(owner, &[FOLDER]).await?;
-        let kept = |object: &ObjectMeta| Some(Kept { listed: Listed::of(object)?, n_bytes: object.size });
+        let kept =
+            |object: &ObjectMeta| Some(OwnedCloud { listed: CloudPlace::of(object)?, n_bytes: object.size });
         Ok(found.iter().filter_map(kept).collect())
     }
 

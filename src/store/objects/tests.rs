@@ -8,7 +8,7 @@ use object_store::memory::InMemory;
 use object_store::path::Path;
 use object_store::{ObjectStoreExt, PutPayload};
 
-use super::cloud_object::CUT;
+use super::cloud_object::TRUNCATED;
 use super::factors::{FactorHead, FactorName};
 use super::*;
 use crate::store::clouds::{CloudStore, RegisteredCloud};
@@ -40,7 +40,7 @@ async fn listed(
     objects: &CloudObjects,
     owner: &OwnerName,
     window: ListWindow,
-) -> (Vec<CloudId>, Option<Listed>) {
+) -> (Vec<CloudId>, Option<CloudPlace>) {
     let (places, _) = objects.list_first(owner, window, HashMap::new()).await.unwrap();
     (places.iter().map(|place| place.id).collect(), places.last().copied())
 }
@@ -50,12 +50,12 @@ async fn all_listed(objects: &CloudObjects, owner: &OwnerName) -> Vec<CloudId> {
 }
 
 /// CloudObjects in a temporary directory, whose times can be set.
-struct Dated {
+struct DatedObjects {
     directory: PathBuf,
     objects: CloudObjects,
 }
 
-impl Dated {
+impl DatedObjects {
     async fn new(name: &str) -> Self {
         let directory = std::env::temp_dir().join(format!("gramian-{name}-{}", std::process::id()));
         let objects = Objects::open(&Place::Directory(directory.clone()), []).await.unwrap();
@@ -70,7 +70,7 @@ impl Dated {
     }
 }
 
-impl Drop for Dated {
+impl Drop for DatedObjects {
     fn drop(&mut self) {
         std::fs::remove_dir_all(&self.directory).ok();
     }
@@ -96,7 +96,7 @@ async fn clouds_are_written_once_read_listed_and_deleted() {
     // a place of its own.
     let alone = registered(9.0, 3).id;
     let since = SystemTime::UNIX_EPOCH;
-    let unstored = [ids[4], alone].map(|id| (id, Listed { since, id }));
+    let unstored = [ids[4], alone].map(|id| (id, CloudPlace { since, id }));
     let window = ListWindow { after: None, n: 9 };
     let (places, is_last) = objects.list_first(&owner, window, HashMap::from(unstored)).await.unwrap();
     let found: Vec<_> = places.iter().map(|place| place.id).collect();
@@ -175,7 +175,7 @@ async fn what_is_damaged_is_put_aside_and_can_be_written_again() {
     assert_eq!(put(&objects, &owner, &cloud).await, Written::Before(cloud.created_at()));
     assert_eq!((objects.n_damaged(), all_listed(&objects, &owner).await.len()), (5, 1));
     // A cloud that is intact again stays in place. Its damaged copy is deleted with it.
-    objects.put_aside(&owner, cloud.id, CUT).await;
+    objects.put_aside(&owner, cloud.id, TRUNCATED).await;
     assert_eq!(objects.n_damaged(), 5);
     assert!(objects.delete_cloud(&owner, cloud.id).await.unwrap());
     let left = objects.objects_in(&owner, &[]).await.unwrap();
@@ -229,7 +229,7 @@ async fn files_that_were_never_whole_go_after_an_hour() {
 
 #[tokio::test]
 async fn the_oldest_clouds_go_by_age_and_by_bytes() {
-    let (dated, one, two) = (Dated::new("oldest").await, owner("one"), owner("two"));
+    let (dated, one, two) = (DatedObjects::new("oldest").await, owner("one"), owner("two"));
     let (objects, now) = (&dated.objects, SystemTime::now());
     let clouds: Vec<_> = (0..6).map(|k| registered(f64::from(k), 3)).collect();
     let mut n_bytes = 0;
@@ -257,7 +257,7 @@ async fn the_oldest_clouds_go_by_age_and_by_bytes() {
 
 #[tokio::test]
 async fn who_has_most_makes_room() {
-    let (dated, modest, greedy) = (Dated::new("most").await, owner("modest"), owner("greedy"));
+    let (dated, modest, greedy) = (DatedObjects::new("most").await, owner("modest"), owner("greedy"));
     let objects = &dated.objects;
     let clouds: Vec<_> = (0..5).map(|k| registered(f64::from(k), 3)).collect();
     let now = SystemTime::now();
@@ -276,7 +276,7 @@ async fn who_has_most_makes_room() {
 
 #[tokio::test]
 async fn a_cloud_that_was_posted_again_during_a_sweep_stays() {
-    let (dated, owner) = (Dated::new("again").await, owner("one"));
+    let (dated, owner) = (DatedObjects::new("again").await, owner("one"));
     let cloud = registered(0.0, 2);
     let hour_ago = SystemTime::now() - Duration::from_secs(3600);
     dated.put_at(&owner, &cloud, hour_ago).await;
@@ -311,7 +311,7 @@ async fn what_was_damaged_goes_after_a_week() {
     let (objects, owner, now) = (objects(), owner("one"), SystemTime::now());
     let gone = registered(1.0, 2);
     objects.put(&objects.cloud(&owner, gone.id), PutPayload::from_static(b"else")).await.unwrap();
-    objects.put_aside(&owner, gone.id, CUT).await;
+    objects.put_aside(&owner, gone.id, TRUNCATED).await;
     let aside = objects.path(&["one", "damaged", &gone.id.to_string()]);
     for (days, is_there) in [(6, true), (8, false)] {
         objects.sweep(Retention::default(), now + Duration::from_secs(86400 * days)).await.unwrap();

@@ -22,8 +22,8 @@ use std::sync::LazyLock;
 use gramian::http::problem;
 use serde_json::{Value, json};
 
-pub use answer::{Received, decompressed};
-use document::{Contract, Operation, Response, Served};
+pub use answer::{AnswerParts, decompressed};
+use document::{Contract, Lookup, Operation, Response};
 use validator::Validator;
 
 /// Paths outside the interface, with everything below them: pages for people, and the documents themselves.
@@ -48,7 +48,7 @@ const OF_HTTP: [&str; 13] = [
 ];
 
 /// Panics if the document does not allow this answer.
-pub fn check(method: &str, path: &str, answer: &Received) {
+pub fn check(method: &str, path: &str, answer: &AnswerParts) {
     static CONTRACT: LazyLock<Contract> = LazyLock::new(|| {
         let document = crate::support::document();
         Contract::new(&document)
@@ -65,12 +65,12 @@ pub fn check(method: &str, path: &str, answer: &Received) {
 
 impl Contract {
     /// Returns every deviation of an answer from the document. Empty if there is none.
-    pub fn mismatches(&self, method: &str, path: &str, answer: &Received) -> Vec<String> {
+    pub fn mismatches(&self, method: &str, path: &str, answer: &AnswerParts) -> Vec<String> {
         let mut found = match self.find(method, path) {
-            Served::By(operation) => of_operation(operation, method, answer),
-            Served::OtherMethods(allowed) => of_undeclared_method(&allowed, method, answer),
-            Served::Nowhere if is_beside(path) => vec![],
-            Served::Nowhere => expect_status(404, "the document has no such path", answer),
+            Lookup::By(operation) => of_operation(operation, method, answer),
+            Lookup::OtherMethods(allowed) => of_undeclared_method(&allowed, method, answer),
+            Lookup::Nowhere if is_beside(path) => vec![],
+            Lookup::Nowhere => expect_status(404, "the document has no such path", answer),
         };
         if answer.status >= 400 {
             found.extend(self.of_problem(method, answer));
@@ -82,7 +82,7 @@ impl Contract {
     }
 
     /// Checks a problem: one form for all of them, and the status that belongs to its type.
-    fn of_problem(&self, method: &str, answer: &Received) -> Vec<String> {
+    fn of_problem(&self, method: &str, answer: &AnswerParts) -> Vec<String> {
         if method == "HEAD" {
             return no_body(answer);
         }
@@ -108,7 +108,7 @@ fn is_beside(path: &str) -> bool {
         .any(|known| path.strip_prefix(known).is_some_and(|rest| rest.is_empty() || rest.starts_with('/')))
 }
 
-fn of_operation(operation: &Operation, method: &str, answer: &Received) -> Vec<String> {
+fn of_operation(operation: &Operation, method: &str, answer: &AnswerParts) -> Vec<String> {
     let Some(response) = operation.get(&answer.status.to_string()) else {
         let declared: Vec<_> = operation.keys().map(String::as_str).collect();
         return vec![format!("status {}, declared are {}", answer.status, declared.join(", "))];
@@ -126,7 +126,7 @@ fn of_operation(operation: &Operation, method: &str, answer: &Received) -> Vec<S
 }
 
 /// Checks that the operation declares the type of a problem for its status.
-fn of_problem_type(response: &Response, answer: &Received) -> Option<String> {
+fn of_problem_type(response: &Response, answer: &AnswerParts) -> Option<String> {
     let problem = answer.json()?;
     let kind = problem["type"].as_str().unwrap_or_default();
     let is_declared = kind.strip_prefix("/problems/").is_some_and(|slug| response.problems.contains(slug));
@@ -135,7 +135,7 @@ fn of_problem_type(response: &Response, answer: &Received) -> Option<String> {
 
 /// Checks the answer to an undeclared method: a CORS preflight where origins are configured, else 405 with
 /// `Allow`.
-fn of_undeclared_method(allowed: &[String], method: &str, answer: &Received) -> Vec<String> {
+fn of_undeclared_method(allowed: &[String], method: &str, answer: &AnswerParts) -> Vec<String> {
     if method == "OPTIONS" && !answer.header("access-control-allow-methods").is_empty() {
         return no_body(answer);
     }
@@ -148,14 +148,14 @@ fn of_undeclared_method(allowed: &[String], method: &str, answer: &Received) -> 
     found
 }
 
-fn expect_status(expected: u16, why: &str, answer: &Received) -> Vec<String> {
+fn expect_status(expected: u16, why: &str, answer: &AnswerParts) -> Vec<String> {
     if answer.status == expected {
         return vec![];
     }
     vec![format!("status {} instead of {expected}: {why}", answer.status)]
 }
 
-fn of_headers(response: &Response, answer: &Received) -> Vec<String> {
+fn of_headers(response: &Response, answer: &AnswerParts) -> Vec<String> {
     let mut found = Vec::new();
     for (name, header) in &response.headers {
         match answer.headers.get(name) {
@@ -180,7 +180,7 @@ fn of_headers(response: &Response, answer: &Received) -> Vec<String> {
     found
 }
 
-fn of_body(response: &Response, answer: &Received) -> Vec<String> {
+fn of_body(response: &Response, answer: &AnswerParts) -> Vec<String> {
     if response.content.is_empty() {
         return no_body(answer);
     }
@@ -202,7 +202,7 @@ fn of_body(response: &Response, answer: &Received) -> Vec<String> {
     }
 }
 
-fn no_body(answer: &Received) -> Vec<String> {
+fn no_body(answer: &AnswerParts) -> Vec<String> {
     if answer.bytes.is_empty() { vec![] } else { vec!["a body, and none is declared".to_owned()] }
 }
 

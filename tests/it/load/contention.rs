@@ -18,7 +18,7 @@ const N_ROUNDS: usize = 200;
 const N_POINTS: usize = 100;
 
 /// Timeout of all rounds of one route. Some rounds take milliseconds, so that only a hang takes this long.
-const PATIENCE: Duration = Duration::from_secs(240);
+const TIMEOUT: Duration = Duration::from_secs(240);
 
 /// Returns a sphere that differs for every route and round.
 fn cloud(route: usize, round: usize) -> Value {
@@ -48,7 +48,7 @@ async fn rounds(n_threads: usize) {
                 }
             }
         };
-        let outcome = tokio::time::timeout(PATIENCE, all).await;
+        let outcome = tokio::time::timeout(TIMEOUT, all).await;
         assert!(outcome.is_ok(), "{} hangs on {n_threads} threads", route.path);
     }
 }
@@ -69,7 +69,7 @@ async fn a_new_cloud_registered_by_many_at_once_is_described_to_all() {
     for round in 0..N_ROUNDS {
         let body = json!({"points": cloud(ROUTES.len(), round)});
         let registering = join_all((0..N_CLIENTS).map(|_| server.post("/v1/clouds", &body)));
-        let answers = tokio::time::timeout(PATIENCE, registering).await.expect("hangs");
+        let answers = tokio::time::timeout(TIMEOUT, registering).await.expect("hangs");
         let n_created = answers.iter().filter(|answer| answer.status == 201).count();
         assert_eq!(n_created, 1, "round {round}");
         assert!(
@@ -115,7 +115,7 @@ async fn noisy_surfaces_and_tables_asked_for_by_many_at_once_are_made_once() {
         let server = Server::with_flags(&["--threads", n_threads]).await;
         for (path, body) in &requests {
             let all = join_all((0..N_CLIENTS).map(|_| server.post(path, body)));
-            let answers = tokio::time::timeout(PATIENCE, all).await.expect("hangs");
+            let answers = tokio::time::timeout(TIMEOUT, all).await.expect("hangs");
             assert_eq!(answers[0].status, 200, "{path}: {}", answers[0].text);
             assert!(answers.iter().all(|answer| answer.text == answers[0].text), "{path}");
         }

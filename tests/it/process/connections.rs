@@ -8,11 +8,11 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 
 use crate::all_routes::route_of;
-use crate::document::contract::{self, Received};
+use crate::document::contract::{self, AnswerParts};
 use crate::support::{Server, fibonacci_sphere, pause};
 
 /// Timeout of a wait. Longer than anything here should take, even on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(20);
+const TIMEOUT: Duration = Duration::from_secs(20);
 
 async fn connect(server: &Server) -> TcpStream {
     TcpStream::connect(server.address).await.unwrap()
@@ -29,12 +29,12 @@ async fn sent(server: &Server, bytes: impl AsRef<[u8]>) -> TcpStream {
 async fn rest_of(stream: &mut TcpStream) -> String {
     let mut received = Vec::new();
     let read = async { while stream.read_buf(&mut received).await.is_ok_and(|n| n > 0) {} };
-    tokio::time::timeout(PATIENCE, read).await.expect("the connection stays open");
+    tokio::time::timeout(TIMEOUT, read).await.expect("the connection stays open");
     String::from_utf8_lossy(&received).into_owned()
 }
 
 /// Reads one answer of known length. The connection stays open.
-async fn answer(stream: &mut TcpStream) -> Received {
+async fn answer(stream: &mut TcpStream) -> AnswerParts {
     let mut received = String::new();
     let read = async {
         let mut byte = [0];
@@ -42,19 +42,19 @@ async fn answer(stream: &mut TcpStream) -> Received {
             stream.read_exact(&mut byte).await.unwrap();
             received.push(byte[0].into());
         }
-        let length = Received::parse(&received).header("content-length").parse().unwrap_or(0);
+        let length = AnswerParts::parse(&received).header("content-length").parse().unwrap_or(0);
         let mut body = vec![0; length];
         stream.read_exact(&mut body).await.unwrap();
         received.push_str(str::from_utf8(&body).unwrap());
     };
-    tokio::time::timeout(PATIENCE, read).await.expect("no answer");
-    Received::parse(&received)
+    tokio::time::timeout(TIMEOUT, read).await.expect("no answer");
+    AnswerParts::parse(&received)
 }
 
 /// Returns status and type of the problem in an answer. Checks that the answer announces the end of its
 /// connection.
 fn closing_problem(method: &str, path: &str, text: &str) -> (u16, String) {
-    let answer = Received::parse(text);
+    let answer = AnswerParts::parse(text);
     contract::check(method, path, &answer);
     assert_eq!(answer.header("connection"), "close", "{text}");
     (answer.status, answer.json().unwrap()["type"].as_str().unwrap().to_owned())
@@ -97,9 +97,9 @@ async fn answers_of_a_known_length_end_in_order() {
         let mut received = Vec::new();
         // A reset would be an error here, and would have discarded unread bytes.
         let read = stream.read_to_end(&mut received);
-        tokio::time::timeout(PATIENCE, read).await.expect("the connection stays open").unwrap();
+        tokio::time::timeout(TIMEOUT, read).await.expect("the connection stays open").unwrap();
         let head = received.windows(4).position(|bytes| bytes == b"\r\n\r\n").unwrap() + 4;
-        let answer = Received::parse(str::from_utf8(&received[..head]).unwrap());
+        let answer = AnswerParts::parse(str::from_utf8(&received[..head]).unwrap());
         assert_eq!(received.len() - head, answer.header("content-length").parse::<usize>().unwrap());
         assert!(received.len() > least, "{}", received.len());
     }
@@ -141,7 +141,7 @@ async fn a_head_that_comes_byte_by_byte_is_not_waited_for() {
             return;
         }
         tokio::time::sleep(Duration::from_millis(10)).await;
-        assert!(began.elapsed() < PATIENCE, "it is still waited for");
+        assert!(began.elapsed() < TIMEOUT, "it is still waited for");
     }
 }
 
@@ -153,7 +153,7 @@ async fn a_connection_of_http_2_that_only_answers_pings_is_ended() {
     let request = hyper_request(server.address, "/health/live");
     assert_eq!(client.send_request(request, true).unwrap().0.await.unwrap().status(), 200);
     // `client` keeps the connection open. It sends no requests, but answers every ping.
-    tokio::time::timeout(PATIENCE, connection).await.expect("it stays open").unwrap().ok();
+    tokio::time::timeout(TIMEOUT, connection).await.expect("it stays open").unwrap().ok();
     drop(client);
 }
 
@@ -186,7 +186,7 @@ async fn answers_that_are_not_read_are_cut() {
         let began = Instant::now();
         // A reset connection is noticed without reading from it.
         while stream.take_error().unwrap().is_none() {
-            assert!(began.elapsed() < PATIENCE, "it is not cut: {:.60} {}", requests, requests.len());
+            assert!(began.elapsed() < TIMEOUT, "it is not cut: {:.60} {}", requests, requests.len());
             tokio::time::sleep(Duration::from_millis(10)).await;
         }
         let received = rest_of(&mut stream).await;
@@ -242,11 +242,11 @@ async fn newcomers_are_told_if_every_connection_has_a_request() {
         let text = rest_of(&mut newcomer).await;
         if text.is_empty() || text.starts_with("HTTP/1.1 200") {
             // The server had not yet read from one of the three, so that one had to make room.
-            assert!(began.elapsed() < PATIENCE);
+            assert!(began.elapsed() < TIMEOUT);
             continue;
         }
         same(&closing_problem("GET", "/health/live", &text), (503, "/problems/overloaded"), &text);
-        assert_eq!(Received::parse(&text).header("retry-after"), "1");
+        assert_eq!(AnswerParts::parse(&text).header("retry-after"), "1");
         break;
     }
     drop(busy);
@@ -255,7 +255,7 @@ async fn newcomers_are_told_if_every_connection_has_a_request() {
         .await
         .contains(" 200 ")
     {
-        assert!(began.elapsed() < PATIENCE, "the places are not given back");
+        assert!(began.elapsed() < TIMEOUT, "the places are not given back");
     }
 }
 
@@ -500,7 +500,7 @@ async fn long_work_ends_with_a_client_that_may_have_left() {
     let text = rest_of(&mut stream).await;
     assert!(text.is_empty(), "{text}");
     while is_busy().await {
-        assert!(began.elapsed() < PATIENCE, "the work goes on");
+        assert!(began.elapsed() < TIMEOUT, "the work goes on");
         pause().await;
     }
 }
@@ -518,7 +518,7 @@ async fn a_client_that_opens_and_resets_streams_is_shown_out() {
         };
         stream.send_reset(h2::Reason::CANCEL);
         drop(answer);
-        match tokio::time::timeout(PATIENCE, client.ready()).await.expect("it hangs") {
+        match tokio::time::timeout(TIMEOUT, client.ready()).await.expect("it hangs") {
             Ok(ready) => client = ready,
             Err(_) => break,
         }
@@ -543,7 +543,7 @@ async fn a_flood_of_pings_keeps_nobody_from_being_served() {
             server.get("/health/live").await.expect_ok();
         }
     };
-    tokio::join!(async { tokio::time::timeout(PATIENCE, flood).await.expect("it goes on for ever") }, others);
+    tokio::join!(async { tokio::time::timeout(TIMEOUT, flood).await.expect("it goes on for ever") }, others);
 }
 
 #[tokio::test]

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::document::contract::{self, Received};
+use crate::document::contract::{self, AnswerParts};
 use crate::running::{Process, curvatures, get, gramian, logged};
 use crate::support::{LOOK_EVERY, pause, receive, unpooled};
 
@@ -170,7 +170,7 @@ async fn what_has_not_been_read_is_refused_while_the_server_drains() {
     for upload in &mut uploads {
         let mut text = String::new();
         upload.read_to_string(&mut text).unwrap();
-        let answer = Received::parse(&text);
+        let answer = AnswerParts::parse(&text);
         contract::check("POST", "/v1/normals", &answer);
         assert_eq!((answer.status, answer.header("connection")), (503, "close"), "{text}");
         assert_eq!(answer.json().unwrap()["type"], "/problems/overloaded");

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use serde_json::json;
 
-use crate::document::contract::Received;
+use crate::document::contract::AnswerParts;
 use crate::running::{Process, gramian, logged};
 use crate::support::{http_client, pause, receive, unpooled};
 use crate::wire::limits::slow_request;
@@ -51,7 +51,7 @@ fn key(name: &str, more: &str) -> (String, String) {
     (key, format!("{lines}{more}\n"))
 }
 
-async fn list(process: &Process, key: &str) -> Received {
+async fn list(process: &Process, key: &str) -> AnswerParts {
     receive(unpooled().get(process.url("/v1/clouds")).bearer_auth(key)).await
 }
 

@@ -107,7 +107,7 @@ async fn each_factor_and_the_fallback_have_their_memory() {
     let process = Process::start(&SMALL);
     let post = async |body: &Value| receive(unpooled().post(process.url("/v1/curvatures")).json(body)).await;
     assert_eq!(post(&request(n)).await.status, 200);
-    let expect_refused = |answer: crate::document::contract::Received| {
+    let expect_refused = |answer: crate::document::contract::AnswerParts| {
         let problem = answer.json().unwrap();
         assert_eq!((answer.status, &problem["type"]), (413, &json!("/problems/problem-too-large")));
         let (required, limit) = (&problem["required"], &problem["limit"]);

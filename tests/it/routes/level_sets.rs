@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::document::contract::Received;
+use crate::document::contract::AnswerParts;
 use crate::support::{Server, fibonacci_sphere, numbers, receive};
 
 fn circle(n: usize) -> Vec<[f64; 2]> {
@@ -10,7 +10,7 @@ fn circle(n: usize) -> Vec<[f64; 2]> {
     (0..n).map(|i| [at(i).cos(), at(i).sin()]).collect()
 }
 
-async fn post_accepting(server: &Server, path: &str, body: &Value, format: &str) -> Received {
+async fn post_accepting(server: &Server, path: &str, body: &Value, format: &str) -> AnswerParts {
     receive(server.client.post(server.url(path)).header("accept", format).json(body)).await
 }
 

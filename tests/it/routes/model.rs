@@ -7,7 +7,7 @@ use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::common::random::Random;
-use crate::document::contract::Received;
+use crate::document::contract::AnswerParts;
 use crate::running::Process;
 use crate::store::durable::Folder;
 use crate::support::{fibonacci_sphere, http_client, receive, unpooled};
@@ -76,7 +76,7 @@ impl World {
         *self.n_done.entry(what).or_default() += 1;
     }
 
-    async fn ask(&self, key: usize, method: Method, path: &str, body: Option<&Value>) -> Received {
+    async fn ask(&self, key: usize, method: Method, path: &str, body: Option<&Value>) -> AnswerParts {
         let request = unpooled().request(method, self.process.url(path)).bearer_auth(KEYS[key]);
         receive(match body {
             Some(body) => request.json(body),
@@ -166,7 +166,7 @@ impl World {
     }
 
     /// Checks an answer with values: equal requests have equal answers, to the last bit.
-    fn check_values(&mut self, cloud: usize, kernel: usize, answer: &Received) {
+    fn check_values(&mut self, cloud: usize, kernel: usize, answer: &AnswerParts) {
         let document = answer.json().unwrap();
         assert_eq!(answer.status, 200, "{document}");
         assert_eq!(document["diagnostics"]["cloud_id"], self.ids[cloud].as_str());

@@ -8,7 +8,7 @@ use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::common::random::Random;
-use crate::document::contract::Received;
+use crate::document::contract::AnswerParts;
 use crate::running::Process;
 use crate::store::durable::Folder;
 use crate::support::{Server, pause, receive, unpooled};
@@ -29,7 +29,7 @@ fn points(cloud: usize) -> Value {
     json!({"points": [[cloud, 0.5], [1.5, 2.5], [3.5, 0.25]]})
 }
 
-async fn ask(url: String, method: Method, body: Option<&Value>) -> Received {
+async fn ask(url: String, method: Method, body: Option<&Value>) -> AnswerParts {
     let request = unpooled().request(method, url);
     receive(match body {
         Some(body) => request.json(body),

@@ -10,7 +10,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 
 use crate::all_routes::{ROUTES, Route, route_of};
-use crate::document::contract::{Received, decompressed};
+use crate::document::contract::{AnswerParts, decompressed};
 use crate::support::{Server, fibonacci_sphere, numbers, receive};
 
 const JSON: &str = "application/json";
@@ -23,7 +23,7 @@ async fn post(
     path: &str,
     headers: &[(&str, &str)],
     body: impl Into<reqwest::Body>,
-) -> Received {
+) -> AnswerParts {
     let mut request = server.client.post(server.url(path)).body(body);
     for (name, value) in headers {
         request = request.header(*name, *value);
@@ -32,7 +32,7 @@ async fn post(
 }
 
 /// Returns the answer to a JSON request in the media type `accept`.
-async fn ask(server: &Server, path: &str, body: &Value, accept: &str) -> Received {
+async fn ask(server: &Server, path: &str, body: &Value, accept: &str) -> AnswerParts {
     let headers = [("content-type", JSON), ("accept", accept)];
     let answer = post(server, path, &headers, body.to_string()).await;
     assert_eq!(answer.status, 200, "{path}: {}", String::from_utf8_lossy(&answer.bytes));

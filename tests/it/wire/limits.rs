@@ -5,7 +5,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 
 use crate::all_routes::{ROUTES, route_of};
-use crate::document::contract::{self, Received};
+use crate::document::contract::{self, AnswerParts};
 use crate::store::durable::Folder;
 use crate::store::jobs::{ask, delete, result};
 use crate::support::{Server, fibonacci_sphere, pause};
@@ -52,7 +52,7 @@ async fn bodies_beyond_the_limit_are_refused_when_streamed() {
     stream.write_all(b"0\r\n\r\n").await.unwrap();
     let mut answer = String::new();
     stream.read_to_string(&mut answer).await.unwrap();
-    let answer = Received::parse(&answer);
+    let answer = AnswerParts::parse(&answer);
     let route = route_of("/v1/interpolation");
     contract::check("POST", route.path, &answer);
     let document = answer.json().unwrap();

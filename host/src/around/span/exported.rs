@@ -9,9 +9,9 @@ use opentelemetry::{Context, KeyValue};
 
 use super::{Attributes, Role, TraceParent};
 
-pub struct Exported(BoxedSpan);
+pub struct ExportedSpan(BoxedSpan);
 
-impl Exported {
+impl ExportedSpan {
     pub fn begin(name: String, role: Role, attributes: Attributes, parent: Option<&TraceParent>) -> Self {
         let context = parent
             .map(context_of)

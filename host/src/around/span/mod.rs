@@ -14,7 +14,7 @@ use uuid::Uuid;
 
 use super::trace::TraceParent;
 use crate::state::metrics::method_label;
-use exported::Exported;
+use exported::ExportedSpan;
 
 /// Who waits for the work of a span.
 #[derive(Debug, Clone, Copy)]
@@ -30,7 +30,7 @@ type Attributes = Vec<(&'static str, String)>;
 
 /// The span of a request, or of work on a job, in the trace of the client if it has one.
 pub struct RequestSpan {
-    span: Exported,
+    span: ExportedSpan,
     trace_id: u128,
     parent: Option<TraceParent>,
 }
@@ -54,7 +54,7 @@ impl RequestSpan {
     }
 
     fn new(name: String, role: Role, attributes: Attributes, parent: Option<TraceParent>) -> Self {
-        let span = Exported::begin(name, role, attributes, parent.as_ref());
+        let span = ExportedSpan::begin(name, role, attributes, parent.as_ref());
         let trace_id = span.context().or_else(|| parent.clone()).map(|known| known.trace_id);
         Self { span, trace_id: trace_id.unwrap_or_else(|| Uuid::new_v4().as_u128()), parent }
     }

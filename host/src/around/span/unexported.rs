@@ -4,9 +4,9 @@ use axum::http::StatusCode;
 
 use super::{Attributes, Role, TraceParent};
 
-pub struct Exported;
+pub struct ExportedSpan;
 
-impl Exported {
+impl ExportedSpan {
     pub fn begin(_name: String, _role: Role, _attributes: Attributes, _parent: Option<&TraceParent>) -> Self {
         Self
     }

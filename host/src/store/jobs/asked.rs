@@ -4,9 +4,9 @@ use bytes::Bytes;
 use futures_util::stream::BoxStream;
 use serde::{Deserialize, Serialize};
 
-use super::super::pieces::{BrokenOff, Found};
+use super::super::pieces::{BrokenOff, OpenObject};
 use super::super::room::Room;
-use super::super::{Damaged, Objects, OwnerName, Unavailable};
+use super::super::{DamagedObject, Objects, OwnerName, Unavailable};
 use super::{JobId, REQUEST, line_of};
 
 /// The request of a job, without its secrets.
@@ -60,11 +60,11 @@ impl Objects {
         &self,
         owner: &OwnerName,
         id: JobId,
-    ) -> Result<Option<Result<FoundRequest, Damaged>>, Unavailable> {
+    ) -> Result<Option<Result<FoundRequest, DamagedObject>>, Unavailable> {
         let found = self.open_pieces(&self.job(owner, id, REQUEST)).await?;
-        let read = |found: Found| {
+        let read = |found: OpenObject| {
             let request = serde_json::from_slice(&found.line);
-            let request = request.map_err(|_| Damaged("its first line is not a request"))?;
+            let request = request.map_err(|_| DamagedObject("its first line is not a request"))?;
             Ok(FoundRequest { request, n_body_bytes: found.n_body_bytes, body: found.body })
         };
         Ok(found.map(|found| found.and_then(read)))
@@ -73,6 +73,6 @@ impl Objects {
     /// Counts and logs a damaged request, whose job then fails.
     pub fn report_job(&self, owner: &OwnerName, id: JobId) {
         let name = self.job(owner, id, REQUEST);
-        self.report(&name, Damaged("its checksum does not match"));
+        self.report(&name, DamagedObject("its checksum does not match"));
     }
 }

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 
 use super::super::pieces::{sealed, unsealed};
 use super::super::sweep::AT_WORK;
-use super::super::{Damaged, Objects, OwnerName, Unavailable, Verb};
+use super::super::{DamagedObject, Objects, OwnerName, Unavailable, Verb};
 use super::{JobId, line_of};
 
 const FOLDER: &str = "claims";
@@ -100,7 +100,7 @@ impl Objects {
             // A generation that is gone was replaced meanwhile.
             if let Some(bytes) = self.counted(Verb::Read, &name, found.await)? {
                 let read = unsealed(&bytes).and_then(|line| {
-                    serde_json::from_slice(line).map_err(|_| Damaged("its line is no list of claims"))
+                    serde_json::from_slice(line).map_err(|_| DamagedObject("its line is no list of claims"))
                 });
                 let claims = read.unwrap_or_else(|damaged| {
                     self.report(&name, damaged);

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::super::pieces::{BrokenOff, sealed, unsealed};
 use super::super::room::Room;
-use super::super::{Damaged, Objects, OwnerName, Unavailable, Verb};
+use super::super::{DamagedObject, Objects, OwnerName, Unavailable, Verb};
 use super::{JobId, RESULT, line_of};
 
 /// Head of the result of a job. The headers are those of the answer.
@@ -33,7 +33,7 @@ pub enum Outcome {
 
 /// A result as it is written. Its body is in the answer of `attempt`, if it has one.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-struct Published {
+struct ResultRecord {
     head: JobResult,
     attempt: Option<u32>,
 }
@@ -97,7 +97,7 @@ impl Objects {
         head: JobResult,
         attempt: Option<u32>,
     ) -> Result<bool, Unavailable> {
-        let result = sealed(line_of(&Published { head, attempt }));
+        let result = sealed(line_of(&ResultRecord { head, attempt }));
         if !self.create(&self.job(owner, id, RESULT), result).await? {
             return Ok(false);
         }
@@ -127,14 +127,14 @@ impl Objects {
         };
         let Some((ended_at, bytes)) = self.counted(Verb::Read, &name, found.await)? else { return Ok(None) };
         let read = unsealed(&bytes).and_then(|line| {
-            serde_json::from_slice(line).map_err(|_| Damaged("its first line is not a result"))
+            serde_json::from_slice(line).map_err(|_| DamagedObject("its first line is not a result"))
         });
         let damaged = match read {
-            Ok(Published { head, attempt: None }) => {
+            Ok(ResultRecord { head, attempt: None }) => {
                 let body = futures_util::stream::empty().boxed();
                 return Ok(Some(FoundResult { head, ended_at, n_body_bytes: 0, body }));
             }
-            Ok(Published { head, attempt: Some(attempt) }) => {
+            Ok(ResultRecord { head, attempt: Some(attempt) }) => {
                 match self.open_pieces(&self.answer(owner, id, attempt)).await? {
                     Some(Ok(found)) => {
                         let body = self.clone().reporting(owner.clone(), id, found.body);
@@ -146,7 +146,7 @@ impl Objects {
                         }));
                     }
                     Some(Err(damaged)) => damaged,
-                    None => Damaged("its body is missing"),
+                    None => DamagedObject("its body is missing"),
                 }
             }
             Err(damaged) => damaged,
@@ -169,7 +169,7 @@ impl Objects {
             let (objects, owner) = (self.clone(), owner.clone());
             async move {
                 if let Err(BrokenOff::Damaged) = piece {
-                    objects.drop_result(&owner, id, Damaged("its checksum does not match")).await;
+                    objects.drop_result(&owner, id, DamagedObject("its checksum does not match")).await;
                 }
                 piece
             }
@@ -178,7 +178,7 @@ impl Objects {
     }
 
     /// Deletes a damaged result and opens its job again.
-    async fn drop_result(&self, owner: &OwnerName, id: JobId, damaged: Damaged) {
+    async fn drop_result(&self, owner: &OwnerName, id: JobId, damaged: DamagedObject) {
         let name = self.job(owner, id, RESULT);
         self.report(&name, damaged);
         let is_gone = self.delete(&name).await.is_ok() && self.mark_open(owner, id).await.is_ok();

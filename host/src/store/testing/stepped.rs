@@ -61,7 +61,7 @@ pub struct Gate {
 }
 
 #[derive(Debug, Clone)]
-pub struct Stepped {
+pub struct SteppedStore {
     inner: Arc<InMemory>,
     gate: Arc<Gate>,
 }
@@ -144,7 +144,7 @@ impl Gate {
     }
 }
 
-impl Stepped {
+impl SteppedStore {
     pub fn new(tells_absence: bool, stops: Stops) -> (Self, Arc<Gate>) {
         let gate = Arc::new(Gate { stops, tells_absence: tells_absence.into(), ..Gate::default() });
         (Self { inner: Arc::default(), gate: gate.clone() }, gate)
@@ -177,14 +177,14 @@ impl Stepped {
     }
 }
 
-impl fmt::Display for Stepped {
+impl fmt::Display for SteppedStore {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("stepped")
     }
 }
 
 #[async_trait]
-impl ObjectStore for Stepped {
+impl ObjectStore for SteppedStore {
     async fn put_opts(&self, name: &Path, payload: PutPayload, options: PutOptions) -> Result<PutResult> {
         self.gate.change(Call::Put, name, self.inner.put_opts(name, payload, options)).await
     }

@@ -3,7 +3,7 @@
 //! Parsing stops where a list is longer than any request may have. So no body takes more memory than requests
 //! within the limits need. Which lists there are is up to the service.
 
-use super::renamed::Renamed;
+use super::renamed::RenamedWord;
 use crate::problem::{Problem, catalogue};
 use crate::wire::negotiation::BodyFormat;
 use gramian_observer::Observer;
@@ -13,7 +13,7 @@ use gramian_observer::Observer;
 pub struct ParseContext<'a> {
     pub lists: &'a Lists,
     /// Words of requests that have another name now.
-    pub renamed: &'a [Renamed],
+    pub renamed: &'a [RenamedWord],
     /// Tells when the request is cancelled because nobody waits for it.
     pub observer: &'a dyn Observer,
 }

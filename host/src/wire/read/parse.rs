@@ -6,8 +6,8 @@ use serde::de::{DeserializeOwned, IgnoredAny};
 use serde_json::Error;
 
 use super::limits::ParseContext;
-use super::reader::{MAX_NESTING, Named, Reader, Stop, read, shortened};
-use super::renamed::Renamed;
+use super::reader::{MAX_NESTING, NamedTable, Reader, Stop, read, shortened};
+use super::renamed::RenamedWord;
 use crate::problem::Problem;
 use crate::problem::catalogue;
 
@@ -15,7 +15,7 @@ use crate::problem::catalogue;
 pub struct Document<'a> {
     text: Cow<'a, [u8]>,
     /// `None` if numbers are in the text.
-    tables: Option<Vec<Named<'a>>>,
+    tables: Option<Vec<NamedTable<'a>>>,
 }
 
 /// A request `T`, and a member `operation` that its body had beside the members of `T`.
@@ -33,7 +33,7 @@ impl<'a> Document<'a> {
 
     /// A body whose numbers are in tables, where those of the same object stand side by side. `text` is the
     /// JSON of all other members.
-    pub(super) fn with_tables(text: Cow<'a, [u8]>, tables: Vec<Named<'a>>) -> Self {
+    pub(super) fn with_tables(text: Cow<'a, [u8]>, tables: Vec<NamedTable<'a>>) -> Self {
         Self { text, tables: Some(tables) }
     }
 
@@ -102,7 +102,7 @@ fn refusal(error: &Error, reader: Reader<'_>, context: &ParseContext<'_>) -> Pro
         (Ok(IgnoredAny), Some(flaw)) => malformed_json(flaw),
         (Ok(IgnoredAny), None) => {
             let detail = error.to_string();
-            let renamed = Renamed::refusal(context.renamed, &detail).unwrap_or(detail);
+            let renamed = RenamedWord::refusal(context.renamed, &detail).unwrap_or(detail);
             Problem::invalid_request(failure.pointer, shortened(renamed.into()))
         }
     }

@@ -2,12 +2,12 @@
 
 /// A word of requests, a member or an entry of an enumeration, that has another name now.
 #[derive(Debug, Clone, Copy)]
-pub struct Renamed {
+pub struct RenamedWord {
     pub old: &'static str,
     pub new: &'static str,
 }
 
-impl Renamed {
+impl RenamedWord {
     /// Words a message of serde that refuses an unknown word anew, if it is the old name of one that serde
     /// expects there.
     pub(super) fn refusal(renamed: &[Self], message: &str) -> Option<String> {
@@ -24,8 +24,9 @@ mod tests {
 
     #[test]
     fn an_old_name_is_refused_with_the_new_one_where_that_is_expected() {
-        let renamed = [Renamed { old: "height", new: "level" }, Renamed { old: "height", new: "altitude" }];
-        let refusal = |message: &str| Renamed::refusal(&renamed, message);
+        let renamed =
+            [RenamedWord { old: "height", new: "level" }, RenamedWord { old: "height", new: "altitude" }];
+        let refusal = |message: &str| RenamedWord::refusal(&renamed, message);
         let of_field =
             refusal("unknown field `height`, expected one of `cloud`, `altitude` at line 1 column 9");
         assert_eq!(of_field.as_deref(), Some("`height` is called `altitude`"));

@@ -24,7 +24,7 @@ use crate::memory::Owner;
 use crate::memory::budget::Reservation;
 use crate::problem::Problem;
 use crate::wire::compression::Compressor;
-use crate::wire::negotiation::{Coding, Format, Wanted};
+use crate::wire::negotiation::{AnswerEncoding, Coding, Format};
 
 /// Most chunks that are encoded at once, in parallel. Longer answers are streamed.
 const CHUNKS_AT_ONCE: usize = 4;
@@ -37,7 +37,7 @@ const BYTES_UNDER_WAY: usize = 1 << 20;
 const LEAST_COMPRESSED_BYTES: usize = 1 << 10;
 
 /// An encoded answer, ready to be sent.
-pub struct Encoded {
+pub struct EncodedAnswer {
     format: Format,
     coding: Coding,
     body: Encoding,
@@ -48,13 +48,13 @@ enum Encoding {
     Chunks(Vec<Chunk>, Box<Compressor>),
 }
 
-impl Encoded {
+impl EncodedAnswer {
     /// Encodes an answer, as far as it is encoded before the first byte is sent.
     ///
     /// # Errors
     /// Returns the errors of [`Answer::into_parts`], or 500 `internal` if a compressor fails.
-    pub fn of(answer: Box<dyn Answer>, wanted: Wanted) -> Result<Self, Problem> {
-        let Wanted { format, coding } = wanted;
+    pub fn of(answer: Box<dyn Answer>, wanted: AnswerEncoding) -> Result<Self, Problem> {
+        let AnswerEncoding { format, coding } = wanted;
         let chunks = answer.into_parts()?.write(format)?;
         let encoded = |coding, body| Ok(Self { format, coding, body });
         if coding == Coding::Identity

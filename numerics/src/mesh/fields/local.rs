@@ -27,7 +27,7 @@ use crate::observer::Observer;
 use crate::orientation::WindingNumbers;
 use crate::points::neighbours::Walk;
 use crate::surface::local::LocalSurface;
-use crate::surface::local::smoothed::Smoothed;
+use crate::surface::local::smoothed::SmoothedCloud;
 
 /// Number of points whose heights are blended. Their weights fall to 0 at the last one.
 const N_BLENDED: usize = 13;
@@ -92,7 +92,7 @@ impl<'a> LocalField<'a> {
         observer: &dyn Observer,
     ) -> Result<(Self, Closedness)> {
         let smoothed = surface.smoothed(observer)?;
-        let on = smoothed.as_ref().map_or(surface.ordered(), Smoothed::placed);
+        let on = smoothed.as_ref().map_or(surface.ordered(), SmoothedCloud::placed);
         let normals = &surface.at_points().normals;
         let winding = WindingNumbers::of(on.cloud, on.sampling, normals, observer)?;
         let closedness_by = |winding: &Option<WindingNumbers>| {

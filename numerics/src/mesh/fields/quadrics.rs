@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::points::neighbours::Neighbour;
 use crate::surface::local::LocalSurface;
-use crate::surface::local::smoothed::Placed;
+use crate::surface::local::smoothed::SampledCloud;
 
 /// A vector of space. Those of the plane have 0 as their third component.
 pub type Vector = [f64; 3];
@@ -106,7 +106,7 @@ impl Quadrics {
 }
 
 fn quadric(surface: &LocalSurface, point: usize, side: f64) -> Quadric {
-    let Placed { cloud, sampling } = surface.ordered();
+    let SampledCloud { cloud, sampling } = surface.ordered();
     let (d, geometry) = (cloud.dimension(), surface.at_points());
     let shape = &geometry.shapes[point * d * d..][..d * d];
     let entry = |row: usize, column: usize| if column < d { side * shape[row * d + column] } else { 0.0 };

@@ -2,14 +2,14 @@
 
 use rayon::prelude::*;
 
-use super::follow::{Followed, is_inside};
+use super::follow::{SurfaceCells, is_inside};
 use super::nodes::{Corner, Edge, Lattice, Node};
 
 /// Cuts all cells. Returns the segments (d = 2) or triangles (d = 3) by their vertices, `[l, d]`: the
 /// positions of their edges among the sorted `edges`.
 ///
 /// Triangles run counter-clockwise seen from outside. Segments have the outside on their right.
-pub fn cut(followed: &Followed, lattice: &Lattice, edges: &[Edge]) -> Vec<u32> {
+pub fn cut(followed: &SurfaceCells, lattice: &Lattice, edges: &[Edge]) -> Vec<u32> {
     let n_corners = 1 << lattice.dimension();
     let of_cell = |cell: &Node| {
         let values = followed.samples.corners(*cell, n_corners);

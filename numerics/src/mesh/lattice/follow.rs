@@ -20,7 +20,7 @@ use crate::points::sampling::Sampling;
 pub struct Samples(HashMap<Node, f64, BuildHasherDefault<NodeHasher>>);
 
 /// Cells that the surface passes, sorted, and the values at all their corners.
-pub struct Followed {
+pub struct SurfaceCells {
     pub samples: Samples,
     pub cells: Vec<Node>,
 }
@@ -105,7 +105,7 @@ pub fn follow(
     seeds: Vec<Node>,
     max_nodes: usize,
     observer: &dyn Observer,
-) -> Result<Followed> {
+) -> Result<SurfaceCells> {
     let mut path = Path { field, region, max_nodes, samples: Samples::default(), cells: Vec::new() };
     let (mut last, mut front) = (Vec::new(), seeds);
     while !front.is_empty() {
@@ -118,7 +118,7 @@ pub fn follow(
     }
     let Path { samples, mut cells, .. } = path;
     cells.par_sort_unstable();
-    Ok(Followed { samples, cells })
+    Ok(SurfaceCells { samples, cells })
 }
 
 /// A surface that is followed.

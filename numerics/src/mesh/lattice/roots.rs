@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::follow::{Followed, is_inside};
+use super::follow::{SurfaceCells, is_inside};
 use super::nodes::{Corner, Edge, Lattice};
 use crate::error::Result;
 use crate::machine::small::Small;
@@ -18,13 +18,13 @@ const MAX_ROUNDS: usize = ILLINOIS_ROUNDS + 14;
 /// The edges of a lattice that the surface crosses.
 pub struct Crossings<'a> {
     lattice: &'a Lattice,
-    followed: &'a Followed,
+    followed: &'a SurfaceCells,
     /// Edges of simplices whose ends differ in sign, sorted.
     pub edges: Vec<Edge>,
 }
 
 impl<'a> Crossings<'a> {
-    pub fn of(followed: &'a Followed, lattice: &'a Lattice) -> Self {
+    pub fn of(followed: &'a SurfaceCells, lattice: &'a Lattice) -> Self {
         Self { lattice, followed, edges: crossed_edges(followed, lattice) }
     }
 
@@ -65,7 +65,7 @@ impl<'a> Crossings<'a> {
     }
 }
 
-fn crossed_edges(followed: &Followed, lattice: &Lattice) -> Vec<Edge> {
+fn crossed_edges(followed: &SurfaceCells, lattice: &Lattice) -> Vec<Edge> {
     let n_corners = 1 << lattice.dimension();
     let pairs = nested_corners(n_corners);
     let of_cell = |cell: &_| {

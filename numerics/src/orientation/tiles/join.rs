@@ -5,7 +5,7 @@ use super::{Border, Region, TileRegions};
 use crate::error::NumericsError;
 use crate::observer::{Observer, for_each, sort_by};
 use crate::orientation::consistent::{CONTRADICTION, RESOLVED};
-use crate::orientation::forest::{Found, SignedForest};
+use crate::orientation::forest::{Membership, SignedForest};
 use crate::orientation::n_neighbours_in;
 use crate::orientation::parts::Parts;
 
@@ -38,7 +38,8 @@ impl<'a> Tiling<'a> {
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
         let first = tiles.iter().find_map(|tile| tile.regions.first());
-        let mut counted = Counted { dimension: first.map_or(0, |region| region.centre.len()), n_points: 0 };
+        let mut counted =
+            RegionCounter { dimension: first.map_or(0, |region| region.centre.len()), n_points: 0 };
         for (at, tile) in tiles.iter().enumerate() {
             observer.checkpoint()?;
             counted.add(at, tile, observer)?;
@@ -66,7 +67,7 @@ impl<'a> Tiling<'a> {
         let n_edges: f64 = self.tiles.iter().map(|tile| tile.n_edges as f64).sum();
         let mut sides = vec![Side { sign: 1.0, is_doubtful: false }; has_sign.len()];
         if weight >= RESOLVED * n_edges {
-            let joined = Joined { numbers: &whole.of_point, borders: &borders, has_sign: &has_sign };
+            let joined = WholeRegions { numbers: &whole.of_point, borders: &borders, has_sign: &has_sign };
             self.choose(&joined, &mut sides, observer)?;
             let against: f64 = borders.iter().map(|border| border.contradiction(&sides)).sum();
             if against > CONTRADICTION * weight {
@@ -113,7 +114,7 @@ impl<'a> Tiling<'a> {
     /// Joins whole regions to pieces and chooses the side of each piece.
     fn choose(
         &self,
-        joined: &Joined<'_>,
+        joined: &WholeRegions<'_>,
         sides: &mut [Side],
         observer: &dyn Observer,
     ) -> Result<(), NumericsError> {
@@ -139,12 +140,12 @@ impl<'a> Tiling<'a> {
     /// Gathers the regions of each piece, and what its borders say.
     fn pieces(
         &self,
-        joined: &Joined<'_>,
-        found: &[Found],
+        joined: &WholeRegions<'_>,
+        found: &[Membership],
         parts: &Parts,
         observer: &dyn Observer,
     ) -> Result<Vec<Piece<'a>>, NumericsError> {
-        let Joined { numbers, borders, has_sign } = *joined;
+        let WholeRegions { numbers, borders, has_sign } = *joined;
         let mut pieces: Vec<Piece<'a>> = (0..parts.members.len())
             .map(|_| Piece { members: Vec::new(), contradiction: Contradiction::default() })
             .collect();
@@ -165,12 +166,12 @@ impl<'a> Tiling<'a> {
 const MAX_POINTS: usize = 1 << 53;
 
 /// Sums over the regions that were checked.
-struct Counted {
+struct RegionCounter {
     dimension: usize,
     n_points: usize,
 }
 
-impl Counted {
+impl RegionCounter {
     /// Checks a tile and adds its regions.
     fn add(&mut self, at: usize, tile: &TileRegions, observer: &dyn Observer) -> Result<(), NumericsError> {
         let before = self.n_points;
@@ -208,14 +209,14 @@ impl Counted {
 }
 
 /// Whole regions with what is known of them.
-struct Joined<'a> {
+struct WholeRegions<'a> {
     /// The whole region of each region.
     numbers: &'a [usize],
     borders: &'a [Border],
     has_sign: &'a [bool],
 }
 
-impl Joined<'_> {
+impl WholeRegions<'_> {
     /// Joins regions by the votes of their borders, surest first.
     fn across_borders(&self, observer: &dyn Observer) -> Result<SignedForest, NumericsError> {
         let is_between = |border: &&Border| border.regions[0] != border.regions[1] && border.vote() != 0.0;

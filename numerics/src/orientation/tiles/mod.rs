@@ -14,7 +14,7 @@ use super::pieces::MAX_LARGE;
 use crate::machine::price::Price;
 pub use join::{Side, Tiling};
 pub use regions::{Border, LabelledRegions, Region, Tile, TileRegions};
-pub(crate) use regions::{Signed, regions_of};
+pub(crate) use regions::{SignedPoints, regions_of};
 
 /// Flops for a region with its rows on the heap, for a coordinate of it, for a comparison of two boxes, and
 /// for each step of sorting borders: estimates of 1 µs, 10 ns, 3 ns and 10 ns.

@@ -25,7 +25,7 @@ pub struct Tile<'a> {
 }
 
 /// Points of a tile with normals on the side of the signature function.
-pub(crate) struct Signed<'a> {
+pub(crate) struct SignedPoints<'a> {
     pub cloud: &'a Cloud,
     pub sampling: &'a Sampling,
     /// Unit vectors `[n, d]`, zero where there is none.
@@ -93,7 +93,7 @@ pub struct LabelledRegions {
 /// # Errors
 /// [`NumericsError::Cancelled`].
 pub(crate) fn regions_of(
-    signed: &Signed<'_>,
+    signed: &SignedPoints<'_>,
     tile: &Tile<'_>,
     observer: &dyn Observer,
 ) -> Result<LabelledRegions, NumericsError> {
@@ -167,7 +167,7 @@ fn borders(edges: &[Edge], labels: &[Option<usize>]) -> Vec<Border> {
 
 /// Points of a tile, to be summed up.
 struct Sums<'a> {
-    signed: &'a Signed<'a>,
+    signed: &'a SignedPoints<'a>,
     is_own: Vec<bool>,
     is_coarse: Vec<bool>,
 }

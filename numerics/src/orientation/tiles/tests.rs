@@ -1,6 +1,6 @@
 //! Sides of clouds in tiles whose sides are known.
 
-use super::{Border, Region, Signed, Tile, TileRegions, Tiling, TilingSize, regions_of, sides_price};
+use super::{Border, Region, SignedPoints, Tile, TileRegions, Tiling, TilingSize, regions_of, sides_price};
 use crate::error::NumericsError;
 use crate::observer::Unobserved;
 use crate::points::cloud::{Cloud, squared_distance};
@@ -89,7 +89,8 @@ impl Scene {
         };
         let (own, coarse) = (places(&is_own), places(&|point| self.coarse.contains(&point)));
         let normals = rows(&self.normals);
-        let signed = Signed { cloud: &cloud, sampling: &sampling, normals: &normals, has_sign: &has_sign };
+        let signed =
+            SignedPoints { cloud: &cloud, sampling: &sampling, normals: &normals, has_sign: &has_sign };
         regions_of(&signed, &Tile { own: &own, coarse: &coarse }, &Unobserved).unwrap()
     }
 }

@@ -6,7 +6,7 @@ use super::areas::areas;
 use super::dipoles::Dipoles;
 use crate::error::NumericsError;
 use crate::observer::Observer;
-use crate::orientation::Sampled;
+use crate::orientation::CloudWithNeighbours;
 use crate::orientation::edges::Edge;
 use crate::points::cloud::Cloud;
 
@@ -23,7 +23,7 @@ pub(crate) struct Field<'a> {
 
 impl<'a> Field<'a> {
     /// Returns the field of some normals, or `None` for a cloud of one position.
-    pub(crate) fn of(sampled: &Sampled<'a>, normals: &'a [f64], edges: &[Edge]) -> Option<Self> {
+    pub(crate) fn of(sampled: &CloudWithNeighbours<'a>, normals: &'a [f64], edges: &[Edge]) -> Option<Self> {
         let (radius, d) = (sampled.cloud.radius(), sampled.cloud.dimension());
         if radius == 0.0 {
             return None;

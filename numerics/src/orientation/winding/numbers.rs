@@ -6,7 +6,7 @@ use crate::error::NumericsError;
 use crate::machine::small::Small;
 use crate::observer::Observer;
 use crate::orientation::edges::sheet_edges;
-use crate::orientation::{Sampled, n_around};
+use crate::orientation::{CloudWithNeighbours, n_around};
 use crate::points::cloud::Cloud;
 use crate::points::neighbourhoods::Neighbourhoods;
 use crate::points::sampling::Sampling;
@@ -35,7 +35,7 @@ impl WindingNumbers {
             return Ok(None);
         }
         let around = Neighbourhoods::of(sampling.neighbours(), cloud, n_around(cloud), observer)?;
-        let sampled = Sampled { cloud, sampling, around: &around, observer };
+        let sampled = CloudWithNeighbours { cloud, sampling, around: &around, observer };
         let areas = areas(&sampled, normals, &sheet_edges(&sampled, normals)?, radius);
         let rows = areas.iter().zip(normals.chunks_exact(d));
         let moments: Vec<f64> =

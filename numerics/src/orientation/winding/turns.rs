@@ -46,7 +46,7 @@ const ON_PATCH: f64 = 0.4;
 const MOST_TURNED: f64 = 0.75;
 
 /// Result of turning patches.
-pub(crate) struct Turned {
+pub(crate) struct TurnedPatches {
     /// Misfits w − ½ at the points, `[n]`.
     pub misfits: Vec<f64>,
     /// True for each piece of which patches were turned.
@@ -64,9 +64,9 @@ pub(crate) fn turn_patches(
     pieces: &Parts,
     edges: &[Edge],
     signs: &mut [f64],
-) -> Result<Turned, NumericsError> {
+) -> Result<TurnedPatches, NumericsError> {
     let (misfits, is_cut) = (field.misfits(signs)?, vec![false; pieces.members.len()]);
-    let mut so_far = Turned { misfits, is_cut, unclear: Vec::new() };
+    let mut so_far = TurnedPatches { misfits, is_cut, unclear: Vec::new() };
     let mut share = 1.0 / N_PATCHES;
     for _ in 0..N_ROUNDS {
         let shares = pieces.shares(&averaged(edges, &so_far.misfits), |misfit| misfit > WRONG);

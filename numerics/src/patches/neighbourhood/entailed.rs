@@ -4,7 +4,7 @@
 //! II is the second fundamental form. The formula is exact on spheres, cylinders and planes. Its part of
 //! second order is `½ II(t,t)`. The rest is the entailed height.
 
-use super::grown::Grown;
+use super::grown::GrowingNeighbourhood;
 use super::quadric::{add_products, backward, factorize, forward, second_derivatives};
 use super::{Scratch, Support};
 use crate::points::neighbours::Neighbour;
@@ -15,7 +15,7 @@ const MAX_TURN: f64 = 0.8;
 /// Number of rounds in which the curvature and the entailed height are made to agree.
 const ROUNDS: usize = 3;
 
-impl<const D: usize, const P: usize> Grown<D, P> {
+impl<const D: usize, const P: usize> GrowingNeighbourhood<D, P> {
     /// Subtracts the entailed height from the heights.
     ///
     /// The entailed height depends on the curvature, and the curvature is fitted to what is left. So the two

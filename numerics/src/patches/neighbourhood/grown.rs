@@ -13,7 +13,7 @@ use crate::points::patch::is_at_rim;
 const MOST_DOUBT: f64 = 0.5;
 
 /// A growing neighbourhood in D dimensions with P terms of the trend.
-pub(super) struct Grown<const D: usize, const P: usize> {
+pub(super) struct GrowingNeighbourhood<const D: usize, const P: usize> {
     /// Number of points in use: the first ones of the scratch.
     n_used: usize,
     radius: f64,
@@ -23,7 +23,7 @@ pub(super) struct Grown<const D: usize, const P: usize> {
     pub(super) quadric: [f64; P],
 }
 
-impl<const D: usize, const P: usize> Grown<D, P> {
+impl<const D: usize, const P: usize> GrowingNeighbourhood<D, P> {
     pub(super) fn put(
         support: &Support,
         x: &[f64],

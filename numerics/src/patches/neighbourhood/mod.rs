@@ -11,7 +11,7 @@ use super::regression::{Batch, n_terms};
 use crate::machine::small::Small;
 use crate::patches::MAX_LOCAL_DIMENSION;
 use crate::points::neighbours::Neighbour;
-use grown::Grown;
+use grown::GrowingNeighbourhood;
 
 /// Points per term of the trend in a whole neighbourhood: 30 points for surfaces in space.
 const POINTS_PER_TERM: usize = 5;
@@ -70,9 +70,9 @@ impl Neighbourhood {
         scratch: &mut Scratch,
     ) -> Option<Self> {
         match x.len() {
-            2 => Grown::<2, { n_terms(2) }>::put(support, x, nearest, batch, lane, scratch),
-            3 => Grown::<3, { n_terms(3) }>::put(support, x, nearest, batch, lane, scratch),
-            4 => Grown::<4, { n_terms(4) }>::put(support, x, nearest, batch, lane, scratch),
+            2 => GrowingNeighbourhood::<2, { n_terms(2) }>::put(support, x, nearest, batch, lane, scratch),
+            3 => GrowingNeighbourhood::<3, { n_terms(3) }>::put(support, x, nearest, batch, lane, scratch),
+            4 => GrowingNeighbourhood::<4, { n_terms(4) }>::put(support, x, nearest, batch, lane, scratch),
             _ => None,
         }
     }

@@ -3,14 +3,14 @@
 
 use pulp::Simd;
 
-use super::Factored;
+use super::FactoredBatch;
 use crate::machine::lanes::triangle;
 use crate::machine::registers::{BLOCK, IN_FLIGHT, Pack};
 
 /// Variance added to every point besides its noise, relative to k₀. It covers rounding of the heights.
 const NUGGET: f64 = 1e-13;
 
-impl<S: Simd> Factored<'_, S> {
+impl<S: Simd> FactoredBatch<'_, S> {
     /// Writes φ below the diagonal and 1 + noise onto it. Rows and columns of empty places are those of the
     /// identity.
     #[inline(always)]

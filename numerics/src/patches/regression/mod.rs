@@ -42,7 +42,7 @@ pub(crate) const fn n_terms(dimension: usize) -> usize {
 
 /// Result of one model at the query of one lane, in units of the radius R of its patch.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Kriged {
+pub(crate) struct ModelResult {
     /// Logarithm of the restricted likelihood, with s² integrated out under the prior 1/s², up to a constant
     /// of the patch. NaN where K is not positive definite in float64, or points do not determine the trend.
     pub log_likelihood: f64,
@@ -85,13 +85,13 @@ pub(crate) struct Krige<'a> {
 }
 
 impl WithSimd for Krige<'_> {
-    type Output = SmallVec<[Kriged; MAX_LANES]>;
+    type Output = SmallVec<[ModelResult; MAX_LANES]>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let (d, layout) = (self.batch.dimension, Layout::dense(self.batch.count));
         let n_extra = extra_rows(d, self.model.trend);
-        let system = Factored {
+        let system = FactoredBatch {
             lower: Lower { simd, layout, registers: self.workspace.registers::<S>() },
             k: d - 1,
             n: self.batch.count,
@@ -109,7 +109,7 @@ impl WithSimd for Krige<'_> {
 /// A batch during its factorization.
 ///
 /// Below the triangle of K come the rows of Fᵀ `[p_trend]`, zᵀ, eᵀ (the entailed heights) and Cᵀ `[p]`.
-struct Factored<'a, S: Simd> {
+struct FactoredBatch<'a, S: Simd> {
     lower: Lower<'a, S>,
     /// Tangential coordinates, d − 1.
     k: usize,
@@ -127,16 +127,16 @@ struct Factored<'a, S: Simd> {
     model: &'a Model,
 }
 
-impl<S: Simd> Factored<'_, S> {
+impl<S: Simd> FactoredBatch<'_, S> {
     #[inline(always)]
-    fn run(mut self, predicts: bool) -> SmallVec<[Kriged; MAX_LANES]> {
+    fn run(mut self, predicts: bool) -> SmallVec<[ModelResult; MAX_LANES]> {
         self.fill_triangle();
         self.fill_trend();
         if predicts {
             self.fill_covariances();
         }
         let n_rows = if predicts { self.n_extra } else { (self.p_trend + 2).next_multiple_of(ROWS) };
-        self.lower.factorize::<ROWS, COLUMNS>(self.n..self.n + n_rows, &Unguarded);
+        self.lower.factorize::<ROWS, COLUMNS>(self.n..self.n + n_rows, &PlainRounding);
         self.solve(predicts)
     }
 
@@ -157,9 +157,9 @@ impl<S: Simd> Factored<'_, S> {
 }
 
 /// Rounding of a factor that is NaN where K is not positive definite in float64.
-struct Unguarded;
+struct PlainRounding;
 
-impl<S: Simd> Rounding<S> for Unguarded {
+impl<S: Simd> Rounding<S> for PlainRounding {
     const JOINS_PRODUCTS: bool = true;
 
     #[inline(always)]

@@ -110,8 +110,8 @@ fn dot<const M: usize>(x: &[f64; M], y: &[f64; M]) -> f64 {
     x.iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
-/// Expected [`Kriged`], by the formulas, with M terms of the trend.
-fn written_out<const M: usize>(points: &Points) -> Kriged {
+/// Expected [`ModelResult`], by the formulas, with M terms of the trend.
+fn written_out<const M: usize>(points: &Points) -> ModelResult {
     let covariance = std::array::from_fn(|i| {
         std::array::from_fn(|j| {
             let noise = if i == j { NOISE * points.weights[i] + 1e-13 } else { 0.0 };
@@ -152,7 +152,7 @@ fn written_out<const M: usize>(points: &Points) -> Kriged {
         let of_trend = dot(&unexplained[i], &times(&inverse_a, &unexplained[j]));
         scale * (prior[i * P + j] - explained + of_trend) + doubt.variance * effect[i] * effect[j]
     };
-    Kriged {
+    ModelResult {
         log_likelihood: -0.5 * (log_k + log_a + freedom * doubt.quadratic.ln()) - doubt.log_penalty,
         scale,
         freedom,

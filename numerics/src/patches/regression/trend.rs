@@ -5,7 +5,7 @@ use smallvec::SmallVec;
 
 use super::doubt::Doubt;
 use super::model::prior_covariance;
-use super::{Factored, Kriged, LEAST_HEIGHT};
+use super::{FactoredBatch, LEAST_HEIGHT, ModelResult};
 use crate::machine::lanes::{MAX_LANES, triangle};
 
 /// Places of registers after the rows.
@@ -30,10 +30,10 @@ impl Places {
     }
 }
 
-impl<S: Simd> Factored<'_, S> {
+impl<S: Simd> FactoredBatch<'_, S> {
     /// Computes the results of all lanes from inner products of the rows below the factor.
     #[inline(always)]
-    pub(super) fn solve(&mut self, predicts: bool) -> SmallVec<[Kriged; MAX_LANES]> {
+    pub(super) fn solve(&mut self, predicts: bool) -> SmallVec<[ModelResult; MAX_LANES]> {
         let width = self.p_trend + 2 + self.p;
         let n_kept = if predicts { width } else { self.p_trend + 2 };
         let places = Places { products: self.scratch, n_kept, small: self.scratch + n_kept * n_kept, width };
@@ -146,7 +146,7 @@ impl<S: Simd> Factored<'_, S> {
 
     /// Collects the numbers of each lane.
     #[inline(always)]
-    fn lanes(&self, places: &Places, predicts: bool) -> SmallVec<[Kriged; MAX_LANES]> {
+    fn lanes(&self, places: &Places, predicts: bool) -> SmallVec<[ModelResult; MAX_LANES]> {
         let (n, p, p_trend) = (self.n, self.p, self.p_trend);
         let numbers: &[f64] = bytemuck::cast_slice(&*self.lower.registers);
         let lanes = S::F64_LANES;
@@ -170,7 +170,7 @@ impl<S: Simd> Factored<'_, S> {
                 f64::NAN
             };
             let scale = doubt.quadratic / freedom;
-            let mut kriged = Kriged { log_likelihood, scale, freedom, ..Kriged::default() };
+            let mut kriged = ModelResult { log_likelihood, scale, freedom, ..ModelResult::default() };
             if predicts {
                 let first = p_trend + 2;
                 let mean = |i: usize| at(places.product(first + i, p_trend), lane);

@@ -10,13 +10,13 @@ use crate::error::{NumericsError, Result};
 use crate::machine::vector::dot;
 use crate::observer::Observer;
 use crate::regression::solver::trend::{Basis, Trend, solve_gram};
-use crate::regression::solver::{Solver, Whitened};
+use crate::regression::solver::{Solver, WhitenedColumns};
 
 /// The mean's part in variances, factored for many functionals.
 pub(super) struct MeanVariance<'a> {
     pub(super) basis: &'a Basis,
     /// `L⁻¹F`: one column for each function.
-    whitened: Whitened,
+    whitened: WhitenedColumns,
     /// `(FᵀWF)⁻¹`, `[p, p]`.
     inverse: Mat<f64>,
 }

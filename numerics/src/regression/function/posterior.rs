@@ -14,7 +14,7 @@ use crate::machine::parallelism::parallelism;
 use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
 use crate::regression::solver::trend::Trend;
-use crate::regression::solver::{Solution, Solver, Whitened};
+use crate::regression::solver::{Solution, Solver, WhitenedColumns};
 use crate::regression::sums::gram::{fill_cross_gram, fill_lower_gram, mirror};
 use crate::regression::sums::nodes::Nodes;
 use crate::regression::sums::regularization::Regularization;
@@ -213,7 +213,7 @@ fn whitened_cross_gram(
     nodes: &Nodes,
     queries: &Cloud,
     observer: &dyn Observer,
-) -> Result<Whitened> {
+) -> Result<WhitenedColumns> {
     observer.enter(Stage::Evaluate);
     let mut columns = vec![0.0; nodes.n_points() * queries.n_points()];
     fill_cross_gram(nodes, solver.kernel(), queries, &mut columns, observer)?;

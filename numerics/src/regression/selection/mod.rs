@@ -18,12 +18,14 @@ mod subject;
 
 pub use alpha_path::{alpha_path, default_alphas};
 pub use criterion::Criterion;
-pub use learning::{Learned, Noise, Observed, is_table, learn, learn_alike, learn_mean, learning_price};
+pub use learning::{
+    LearnedModel, Noise, ObservedCloud, is_table, learn, learn_alike, learn_mean, learning_price,
+};
 pub use leave_one_out::{LeaveOneOut, leave_one_out, leave_one_out_with};
 pub use parameters::{Hyperparameters, Parameter, Variation};
 pub use price::{
     CloudSize, SearchSize, alpha_path_price, expected_evaluations, leave_one_out_price, selection_price,
 };
 pub use prior::ScalePrior;
-pub use search::{MAX_EVALUATIONS, Selected, Selection, Side, select};
+pub use search::{MAX_EVALUATIONS, SearchResult, Selection, Side, select};
 pub use subject::Observations;

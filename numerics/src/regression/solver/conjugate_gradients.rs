@@ -18,7 +18,7 @@ pub(super) const SLACK: f64 = 0.05;
 const OF_CURVATURE: f64 = 0.1;
 
 /// Iterations without a new smallest residual after which rounding is all that is left.
-const PATIENCE: usize = 25;
+const MAX_STALLED: usize = 25;
 
 /// Largest number of iterations. A preconditioner that needs more is none.
 const MOST: usize = 500;
@@ -51,7 +51,7 @@ pub(super) struct Goal {
 }
 
 /// One column of `AX = B` as it was solved.
-pub(super) struct Iterated {
+pub(super) struct ColumnSolution {
     /// x, `[n]`.
     pub x: Vec<f64>,
     /// `b − Ax` as the recurrence has it, `[n]`.
@@ -87,7 +87,7 @@ pub(super) fn conjugate_gradients(
     right: &[f64],
     goal: Goal,
     observer: &dyn Observer,
-) -> Result<Vec<Iterated>> {
+) -> Result<Vec<ColumnSolution>> {
     let n = of.n_points();
     let mut columns: Vec<Column> = right.chunks_exact(n).map(Column::new).collect();
     for iteration in 1..=MOST {
@@ -127,10 +127,10 @@ impl Column {
         }
     }
 
-    fn finished(self) -> Iterated {
+    fn finished(self) -> ColumnSolution {
         let size = self.size;
         let scaled = |column: Vec<f64>| column.into_iter().map(|entry| size * entry).collect();
-        Iterated {
+        ColumnSolution {
             relative_residual: norm(&self.residual),
             n_iterations: self.reached_at,
             x: scaled(self.x),
@@ -139,7 +139,7 @@ impl Column {
     }
 
     fn is_active(&self, tolerance: f64, iteration: usize) -> bool {
-        self.smallest > tolerance && iteration <= self.reached_at + PATIENCE
+        self.smallest > tolerance && iteration <= self.reached_at + MAX_STALLED
     }
 
     /// How exact the next product must be. The step to the next residual is hardly longer than the residual.

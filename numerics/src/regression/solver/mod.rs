@@ -31,9 +31,11 @@ pub(crate) use factorized::SMALLEST_PIVOT;
 pub use factorized::{Method, Remaining, Solver, Workspace};
 pub use landmark::{expected_landmarks, probe_price};
 pub(crate) use solution::MAX_RELATIVE_RESIDUAL;
-pub use solution::{Autocorrelation, Disagreement, Known, Outlier, Place, Solution, Sought};
+pub use solution::{
+    Autocorrelation, Disagreement, EarlierSolutions, Outlier, Place, RightHandSide, Solution,
+};
 pub use system::System;
-pub(crate) use whitening::Whitened;
+pub(crate) use whitening::WhitenedColumns;
 
 /// Largest relative residual of an answer by conjugate gradients, unless a request has another.
 pub const DEFAULT_TOLERANCE: f64 = 1e-8;

@@ -16,13 +16,13 @@ use crate::points::cloud::Cloud;
 ///
 /// The first rows of a column count as explained, the others as not: the products of the latter are
 /// subtracted.
-pub(crate) struct Whitened {
+pub(crate) struct WhitenedColumns {
     pub(crate) columns: Vec<f64>,
     pub(crate) n_rows: usize,
     pub(crate) n_explaining: usize,
 }
 
-impl Whitened {
+impl WhitenedColumns {
     /// Columns of two halves, `[2 half, k]`, of which the first ones count as explained.
     fn in_halves(columns: Vec<f64>, half: usize) -> Self {
         Self { columns, n_rows: 2 * half, n_explaining: half }
@@ -52,40 +52,45 @@ impl Solver {
     }
 
     /// Whitens covariances with the [`Solver::known_points`], one column for each functional: `L⁻¹` times
-    /// them, `LLᵀ = K + αI`, or what stands for it. [`Whitened::explained`] is then the covariance that the
-    /// values explain.
+    /// them, `LLᵀ = K + αI`, or what stands for it. [`WhitenedColumns::explained`] is then the covariance
+    /// that the values explain.
     ///
     /// # Errors
     /// [`NumericsError::NotPositiveDefinite`] where the matrix has no such factor in float64;
     /// [`NumericsError::Cancelled`].
-    pub(crate) fn whitened(&self, covariances: Vec<f64>, observer: &dyn Observer) -> Result<Whitened> {
+    pub(crate) fn whitened(&self, covariances: Vec<f64>, observer: &dyn Observer) -> Result<WhitenedColumns> {
         let n = self.system.n_points();
         match &self.factorization {
             Factorization::Landmark(landmarks) => {
-                Ok(Whitened::in_halves(landmarks.whitened(&covariances), landmarks.rank()))
+                Ok(WhitenedColumns::in_halves(landmarks.whitened(&covariances), landmarks.rank()))
             }
             Factorization::Iterative(iterative) => {
-                Ok(Whitened::in_halves(iterative.whitened(&covariances, observer)?, n))
+                Ok(WhitenedColumns::in_halves(iterative.whitened(&covariances, observer)?, n))
             }
             Factorization::Cholesky(_) | Factorization::PivotedCholesky { .. } => {
                 let mut columns = covariances;
                 let count = columns.len() / n;
                 self.whiten_in_place(MatMut::from_column_major_slice_mut(&mut columns, n, count), observer)?;
-                Ok(Whitened { columns, n_rows: n, n_explaining: n })
+                Ok(WhitenedColumns { columns, n_rows: n, n_explaining: n })
             }
         }
     }
 
-    /// Whitens values `[n, k]` in the same way, such that [`Whitened::explained`] of them and covariances is
-    /// what their fit predicts.
+    /// Whitens values `[n, k]` in the same way, such that [`WhitenedColumns::explained`] of them and
+    /// covariances is what their fit predicts.
     ///
     /// # Errors
     /// Returns the errors of [`Solver::whitened`].
-    pub(crate) fn whitened_values(&self, values: Vec<f64>, observer: &dyn Observer) -> Result<Whitened> {
+    pub(crate) fn whitened_values(
+        &self,
+        values: Vec<f64>,
+        observer: &dyn Observer,
+    ) -> Result<WhitenedColumns> {
         match &self.factorization {
-            Factorization::Landmark(landmarks) => {
-                Ok(Whitened::in_halves(landmarks.whitened_values(&values, observer)?, landmarks.rank()))
-            }
+            Factorization::Landmark(landmarks) => Ok(WhitenedColumns::in_halves(
+                landmarks.whitened_values(&values, observer)?,
+                landmarks.rank(),
+            )),
             Factorization::Cholesky(_)
             | Factorization::PivotedCholesky { .. }
             | Factorization::Iterative(_) => self.whitened(values, observer),

@@ -9,7 +9,7 @@
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
-use super::smoothed::Placed;
+use super::smoothed::SampledCloud;
 use crate::error::NumericsError;
 use crate::machine::vector::{dot, norm};
 use crate::observer::Observer;
@@ -67,7 +67,7 @@ pub(super) struct Queries<'a> {
 
 /// The points of a surface with their geometry, normals outward.
 pub(super) struct Points<'a> {
-    pub on: Placed<'a>,
+    pub on: SampledCloud<'a>,
     pub geometry: &'a PatchGeometry,
 }
 

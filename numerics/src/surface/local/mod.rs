@@ -18,15 +18,15 @@ use crate::error::NumericsError;
 use crate::machine::heap::{arc_payload, block_bytes, vec_bytes};
 use crate::machine::vector::{dot, norm};
 use crate::observer::{Observer, Stage};
-use crate::orientation::tiles::{LabelledRegions, Signed, Tile, regions_of};
-use crate::orientation::{Directions, Oriented, Sampled, SurfaceOrientation};
+use crate::orientation::tiles::{LabelledRegions, SignedPoints, Tile, regions_of};
+use crate::orientation::{CloudWithNeighbours, Directions, OrientedNormals, SurfaceOrientation};
 use crate::patches::{PatchGeometry, PatchHyperparameters, Patches};
 use crate::points::cloud::Cloud;
 use crate::points::neighbourhoods::Neighbourhoods;
 use crate::points::sampling::Sampling;
 use bend::Bend;
 use coarse::outward_directions;
-use smoothed::{Placed, Smoothed, is_noisy};
+use smoothed::{SampledCloud, SmoothedCloud, is_noisy};
 use sure::least_ratio;
 use tree_order::TreeOrder;
 
@@ -133,13 +133,13 @@ impl LocalSurface {
             None => outward_directions(&ordered.cloud, patches.noise(), observer)?,
         };
         let sides = Sides { directions, are_given: given.normals.is_some() };
-        let points = Placed { cloud: &ordered.cloud, sampling: &ordered.sampling };
-        let smoothed = Smoothed::of_noisy(points, &at_points, patches.noise(), observer)?;
-        let on = smoothed.as_ref().map_or(points, Smoothed::placed);
+        let points = SampledCloud { cloud: &ordered.cloud, sampling: &ordered.sampling };
+        let smoothed = SmoothedCloud::of_noisy(points, &at_points, patches.noise(), observer)?;
+        let on = smoothed.as_ref().map_or(points, SmoothedCloud::placed);
         let oriented = orient(on, &at_points, &sides, observer)?;
         let outward = |point: usize| &oriented.normals[point * d..][..d];
         at_points.turn(|point, normal| if dot(outward(point), normal) < 0.0 { -1.0 } else { 1.0 });
-        let Oriented { how: orientation, is_consistent, is_ambiguous, .. } = oriented;
+        let OrientedNormals { how: orientation, is_consistent, is_ambiguous, .. } = oriented;
         let (radius, least_ratio) = match known {
             Some(known) => (known.radius, known.least_ratio),
             None => {
@@ -181,8 +181,8 @@ impl LocalSurface {
     }
 
     /// The points in the order of [`LocalSurface::at_points`].
-    pub(crate) fn ordered(&self) -> Placed<'_> {
-        Placed { cloud: &self.ordered.cloud, sampling: &self.ordered.sampling }
+    pub(crate) fn ordered(&self) -> SampledCloud<'_> {
+        SampledCloud { cloud: &self.ordered.cloud, sampling: &self.ordered.sampling }
     }
 
     /// Geometry at the ordered points, with outward normals.
@@ -196,9 +196,9 @@ impl LocalSurface {
     }
 
     /// Returns the outward normals of the points in the order in which they were given.
-    pub(crate) fn oriented(&self) -> Oriented {
+    pub(crate) fn oriented(&self) -> OrientedNormals {
         let d = self.cloud.dimension();
-        Oriented {
+        OrientedNormals {
             normals: self.ordered.given_rows(&self.at_points.normals, d),
             how: self.orientation,
             is_consistent: self.is_consistent,
@@ -211,8 +211,8 @@ impl LocalSurface {
     }
 
     /// Returns the feet of the points, unless the points tell their sides as well.
-    pub(crate) fn smoothed(&self, observer: &dyn Observer) -> Result<Option<Smoothed>, NumericsError> {
-        Smoothed::of_noisy(self.ordered(), &self.at_points, self.patches.noise(), observer)
+    pub(crate) fn smoothed(&self, observer: &dyn Observer) -> Result<Option<SmoothedCloud>, NumericsError> {
+        SmoothedCloud::of_noisy(self.ordered(), &self.at_points, self.patches.noise(), observer)
     }
 
     /// Returns what the regressions learned, or were given.
@@ -263,7 +263,7 @@ impl LocalSurface {
         let along = normals.chunks_exact_mut(d).zip(directions.points());
         let has_sign: Vec<bool> = along.map(|(normal, direction)| turn_along(normal, direction)).collect();
         let (cloud, sampling) = (&self.cloud, &self.sampling);
-        regions_of(&Signed { cloud, sampling, normals: &normals, has_sign: &has_sign }, tile, observer)
+        regions_of(&SignedPoints { cloud, sampling, normals: &normals, has_sign: &has_sign }, tile, observer)
     }
 
     /// Bytes held on the heap beside the cloud and its sampling.
@@ -286,12 +286,12 @@ struct Sides {
 
 /// Orients the normals of patches, by whole regions of the points or their feet.
 fn orient(
-    on: Placed<'_>,
+    on: SampledCloud<'_>,
     geometry: &PatchGeometry,
     sides: &Sides,
     observer: &dyn Observer,
-) -> Result<Oriented, NumericsError> {
-    let Placed { cloud, sampling } = on;
+) -> Result<OrientedNormals, NumericsError> {
+    let SampledCloud { cloud, sampling } = on;
     let d = cloud.dimension();
     let mut normals = geometry.normals.clone();
     let along = normals.chunks_exact_mut(d).zip(sides.directions.chunks_exact(d));
@@ -299,8 +299,8 @@ fn orient(
     let count = crate::orientation::n_around(cloud);
     let around = Neighbourhoods::of(sampling.neighbours(), cloud, count, observer)?;
     let directions = Directions { normals, has_sign, is_at_rim: geometry.is_at_rim.clone() };
-    let sampled = Sampled { cloud, sampling, around: &around, observer };
-    Oriented::of_directions(&sampled, directions, sides.are_given)
+    let sampled = CloudWithNeighbours { cloud, sampling, around: &around, observer };
+    OrientedNormals::of_directions(&sampled, directions, sides.are_given)
 }
 
 /// Turns a normal to the side of a direction. Returns whether the direction says something of the side.

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::bend::Bend;
 use super::edges::{Points, Queries};
-use super::{LocalSurface, Placed};
+use super::{LocalSurface, SampledCloud};
 use crate::error::NumericsError;
 use crate::observer::{Observer, Stage};
 use crate::patches::{CurvatureDeviations, PatchGeometry};
@@ -13,7 +13,7 @@ use crate::points::neighbours::Neighbour;
 use crate::surface::NearNormals;
 use crate::surface::flags::{FlagReason, is_far};
 use crate::surface::request::{GeometryRequest, Orientation};
-use crate::surface::served::{Deviations, Served, ServedBy, Verdict};
+use crate::surface::served::{Deviations, GeometryArrays, ServedBy, Verdict};
 
 /// Deviation of a normal, radians, beyond which it is flagged. On a scan this flags a fiftieth of the points,
 /// among them seven tenths of the normals that are off by 30°.
@@ -29,7 +29,7 @@ impl LocalSurface {
         queries: &Cloud,
         request: &GeometryRequest,
         observer: &dyn Observer,
-    ) -> Result<Served, NumericsError> {
+    ) -> Result<GeometryArrays, NumericsError> {
         observer.enter(Stage::Evaluate);
         let (m, d) = (queries.n_points(), queries.dimension());
         let are_all = *queries == *self.cloud;
@@ -61,7 +61,7 @@ impl LocalSurface {
             let reason = self.reason(&geometry, query, request, doubts[query]);
             Verdict { sign, by: ServedBy::Regression, reason }
         };
-        Ok(Served {
+        Ok(GeometryArrays {
             dimension: d,
             verdicts: (0..m).into_par_iter().map(verdict).collect(),
             levels: geometry.heights.iter().map(|height| 1.0 - height).collect(),
@@ -80,7 +80,7 @@ impl LocalSurface {
 
     /// Whether the sides of other places are in doubt, `[m]`, which they have from the nearest point.
     fn doubts_of_sides(&self, places: &Cloud) -> Vec<Option<FlagReason>> {
-        let Placed { sampling, .. } = self.ordered();
+        let SampledCloud { sampling, .. } = self.ordered();
         let doubt = |found: &mut Vec<Neighbour>, place: usize| {
             sampling.neighbours().nearest_into(places.point(place), 1, found);
             let is_near = |found: &&Neighbour| !is_far(found.squared_distance, sampling.spacing(found.point));

@@ -30,19 +30,19 @@ struct Quantiles {
 }
 
 /// The feet of the points of a cloud, with their sampling.
-pub(crate) struct Smoothed {
+pub(crate) struct SmoothedCloud {
     cloud: Cloud,
     sampling: Sampling,
 }
 
-impl Smoothed {
+impl SmoothedCloud {
     /// Moves points by their heights, if the noise is such that their sides could not be told ([`is_noisy`]).
     /// Points without a regression stay where they are.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
     pub(crate) fn of_noisy(
-        points: Placed<'_>,
+        points: SampledCloud<'_>,
         geometry: &PatchGeometry,
         noise: f64,
         observer: &dyn Observer,
@@ -56,20 +56,20 @@ impl Smoothed {
         Ok(Some(Self { cloud, sampling }))
     }
 
-    pub(crate) fn placed(&self) -> Placed<'_> {
-        Placed { cloud: &self.cloud, sampling: &self.sampling }
+    pub(crate) fn placed(&self) -> SampledCloud<'_> {
+        SampledCloud { cloud: &self.cloud, sampling: &self.sampling }
     }
 }
 
 /// Points with their sampling.
 #[derive(Clone, Copy)]
-pub(crate) struct Placed<'a> {
+pub(crate) struct SampledCloud<'a> {
     pub cloud: &'a Cloud,
     pub sampling: &'a Sampling,
 }
 
 /// Returns whether noise across the surface, L, is such that the points do not tell their sides.
-pub(super) fn is_noisy(points: Placed<'_>, geometry: &PatchGeometry, noise: f64) -> bool {
+pub(super) fn is_noisy(points: SampledCloud<'_>, geometry: &PatchGeometry, noise: f64) -> bool {
     let scales = points.sampling.scales();
     let step = if points.cloud.dimension() == 2 { scales.nearest } else { scales.spacing };
     noise >= NOISY * step && are_like_noise(&geometry.heights)

@@ -50,7 +50,7 @@ const LEFT_OUT_MISS: f64 = 0.01;
 const LEFT_OUT_SURELY: f64 = 0.002;
 
 /// Curvatures at a query, to be confirmed.
-pub(crate) struct Unconfirmed<'a> {
+pub(crate) struct CurvatureCandidate<'a> {
     pub x: &'a [f64],
     /// Spacing h_q, unit L.
     pub spacing: f64,
@@ -65,7 +65,7 @@ pub(crate) struct Unconfirmed<'a> {
     pub may_use_patch: bool,
 }
 
-impl Unconfirmed<'_> {
+impl CurvatureCandidate<'_> {
     /// Returns whether the points around x confirm the curvatures.
     pub(crate) fn is_confirmed_by(&self, surface: &SignatureSurface) -> bool {
         let is_noisy = self.is_noisy(surface);

@@ -7,7 +7,7 @@ use crate::machine::vector::{dot, norm};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::surface::curvature::principal_curvatures;
-use crate::surface::served::{Deviations, Served};
+use crate::surface::served::{Deviations, GeometryArrays};
 
 /// Computes deviations: the root of the sum of the squares of the deviation of a local regression and of the
 /// difference from it.
@@ -19,7 +19,7 @@ use crate::surface::served::{Deviations, Served};
 pub(super) fn deviations(
     surface: &SignatureSurface,
     queries: &Cloud,
-    served: &Served,
+    served: &GeometryArrays,
     observer: &dyn Observer,
 ) -> Result<Deviations> {
     let (m, d) = (queries.n_points(), queries.dimension());

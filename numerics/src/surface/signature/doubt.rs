@@ -11,7 +11,7 @@ use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::points::local_quadrics::LocalQuadric;
 use crate::points::quadric::n_quadric_neighbours;
-use crate::surface::served::Served;
+use crate::surface::served::GeometryArrays;
 
 /// Cosine of the angle to the normal of the quadric, 0.15 rad, up to which a normal is not doubted.
 const PLAINLY: f64 = 0.989;
@@ -40,7 +40,7 @@ pub(super) fn uncertain<'a>(
     surface: &SignatureSurface,
     queries: &Cloud,
     doubtful: &[usize],
-    served: &Served,
+    served: &GeometryArrays,
     quadric: impl Fn(usize) -> Option<LocalQuadric<'a>>,
     observer: &dyn Observer,
 ) -> Result<Vec<usize>> {

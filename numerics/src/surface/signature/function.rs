@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::machine::heap::vec_bytes;
 use crate::observer::Observer;
 use crate::regression::function::interpolant::Interpolant;
-use crate::regression::solver::{Solution, Solver, Sought};
+use crate::regression::solver::{RightHandSide, Solution, Solver};
 use crate::regression::sums::jets::{JetOrder, Jets};
 use crate::surface::flags::roundings;
 
@@ -47,7 +47,7 @@ impl Signature {
         observer: &dyn Observer,
     ) -> Result<Self> {
         let ones = vec![1.0; solver.n_points()];
-        let sought = Sought { values: &ones, earlier };
+        let sought = RightHandSide { values: &ones, earlier };
         let order = (!solver.kernel().has_kink()).then_some(JetOrder::Hessian);
         let (solution, jets) = Solution::with_jets(&solver, sought, order, observer)?;
         Self::with(Interpolant { solver, solution: Arc::new(solution) }, jets, observer)

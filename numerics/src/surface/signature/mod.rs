@@ -17,7 +17,7 @@ use crate::error::{NumericsError, Result};
 use crate::machine::heap::{arc_payload, block_bytes, vec_bytes};
 use crate::machine::vector::dot;
 use crate::observer::Observer;
-use crate::orientation::{Oriented, Sampled, SurfaceOrientation, n_around};
+use crate::orientation::{CloudWithNeighbours, OrientedNormals, SurfaceOrientation, n_around};
 use crate::patches::Patches;
 use crate::points::cloud::Cloud;
 use crate::points::duplicates::count_duplicates;
@@ -42,7 +42,7 @@ pub struct SignatureSurface {
     signature: Signature,
     pub(super) sampling: Arc<Sampling>,
     quadrics: LocalQuadrics,
-    oriented: Oriented,
+    oriented: OrientedNormals,
     is_too_rough: bool,
     radius: f64,
     left_out_misses: OnceLock<Option<Vec<f64>>>,
@@ -88,8 +88,8 @@ impl SignatureSurface {
             Some(oriented) => oriented,
             None => {
                 let directions = directions(&signature, &sampling, &quadrics, observer)?;
-                let sampled = Sampled { cloud, sampling: &sampling, around: &around, observer };
-                Oriented::of(&sampled, directions, &quadrics, given)?
+                let sampled = CloudWithNeighbours { cloud, sampling: &sampling, around: &around, observer };
+                OrientedNormals::of(&sampled, directions, &quadrics, given)?
             }
         };
         let is_too_rough = is_too_rough(solver.kernel(), sampling.scales());

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::error::Result;
 use crate::observer::Observer;
-use crate::orientation::Oriented;
+use crate::orientation::OrientedNormals;
 use crate::points::cloud::Cloud;
 use crate::points::sampling::Sampling;
 use crate::surface::local::{Given, LocalSurface};
@@ -22,7 +22,7 @@ pub(super) fn oriented_curve(
     cloud: &Arc<Cloud>,
     sampling: &Arc<Sampling>,
     observer: &dyn Observer,
-) -> Result<Option<Oriented>> {
+) -> Result<Option<OrientedNormals>> {
     if cloud.dimension() != 2 {
         return Ok(None);
     }

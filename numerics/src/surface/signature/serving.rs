@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use rayon::prelude::*;
 
 use super::SignatureSurface;
-use super::confirmation::Unconfirmed;
+use super::confirmation::CurvatureCandidate;
 use super::deviations::deviations;
 use super::doubt::{is_doubtful, uncertain};
 use super::offset::{OffsetJet, offset_jet_at};
@@ -22,7 +22,7 @@ use crate::regression::sums::jets::{JetOrder, Jets};
 use crate::surface::curvature::principal_curvatures;
 use crate::surface::flags::{FlagReason, is_far, is_weak, lacks_normal, roundings};
 use crate::surface::request::{GeometryRequest, Orientation, SurfaceModel};
-use crate::surface::served::{Served, ServedBy, Verdict};
+use crate::surface::served::{GeometryArrays, ServedBy, Verdict};
 
 /// Distance from the local quadric, in spacings, up to which a query counts as on the surface. There the
 /// gradient must be normal to the quadric.
@@ -37,7 +37,7 @@ pub(crate) fn serve(
     queries: &Cloud,
     request: &GeometryRequest,
     observer: &dyn Observer,
-) -> Result<Served> {
+) -> Result<GeometryArrays> {
     let order = match request.model {
         SurfaceModel::Offset => JetOrder::Value,
         SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Regression => JetOrder::Hessian,
@@ -133,7 +133,7 @@ impl Slot<'_> {
 }
 
 impl Service<'_> {
-    fn serve(&self, observer: &dyn Observer) -> Result<Served> {
+    fn serve(&self, observer: &dyn Observer) -> Result<GeometryArrays> {
         let (m, d) = (self.queries.n_points(), self.queries.dimension());
         let look = |query| {
             observer.checkpoint()?;
@@ -161,7 +161,8 @@ impl Service<'_> {
         )?;
         let levels = self.jets.values();
         let (deviations, edges) = (None, Vec::new());
-        let mut served = Served { dimension: d, gradients, hessians, verdicts, levels, deviations, edges };
+        let mut served =
+            GeometryArrays { dimension: d, gradients, hessians, verdicts, levels, deviations, edges };
         if !self.request.checks_curvatures {
             self.flag_normals(&mut served, observer)?;
         }
@@ -169,7 +170,7 @@ impl Service<'_> {
     }
 
     /// Flags the normals of which too little is known.
-    fn flag_normals(&self, served: &mut Served, observer: &dyn Observer) -> Result<()> {
+    fn flag_normals(&self, served: &mut GeometryArrays, observer: &dyn Observer) -> Result<()> {
         let quadric = |query: usize| self.site(query).quadric;
         let is_doubtful = |&query: &usize| {
             served.verdict(query).reason.is_none() && is_doubtful(served.gradient(query), quadric(query))
@@ -297,7 +298,7 @@ impl Service<'_> {
         let gradient_norm = norm(slot.gradient);
         let normal: Small = slot.gradient.iter().map(|g| verdict.sign * g / gradient_norm).collect();
         let (curvatures, _) = principal_curvatures(slot.gradient, slot.hessian, verdict.sign);
-        let unconfirmed = Unconfirmed {
+        let unconfirmed = CurvatureCandidate {
             x: site.x,
             spacing: site.spacing,
             curvatures: &curvatures,

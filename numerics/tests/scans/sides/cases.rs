@@ -3,20 +3,20 @@
 use std::f64::consts::TAU;
 
 use super::clouds::{
-    Sided, along, cassini, faceted, folded_strip, half_cone, half_lens, half_plate, length_around, length_of,
-    polar, revolved, revolved_area, ring, sphere, surface_spacing,
+    OrientedCloud, along, cassini, faceted, folded_strip, half_cone, half_lens, half_plate, length_around,
+    length_of, polar, revolved, revolved_area, ring, sphere, surface_spacing,
 };
 use crate::common::random::Random;
 
 /// A cloud, and the distance between its sheets in spacings, infinite for a single sheet.
 pub struct Case {
     pub name: String,
-    pub sided: Sided,
+    pub sided: OrientedCloud,
     pub thickness: f64,
 }
 
 impl Case {
-    fn new(name: String, sided: Sided, thickness: f64) -> Self {
+    fn new(name: String, sided: OrientedCloud, thickness: f64) -> Self {
         Self { name, sided, thickness }
     }
 }
@@ -129,7 +129,7 @@ pub fn two_spheres(n: usize, gap: f64, seed: u64) -> Case {
     let mut random = Random(seed);
     let spacing = surface_spacing(2.0 * TAU, n / 2);
     let parts = [0.0, 2.0 + gap * spacing].map(|x| sphere([x, 0.0, 0.0], 1.0, n / 2, &mut random));
-    Case::new(format!("two spheres, {gap}"), Sided::together(&parts), gap)
+    Case::new(format!("two spheres, {gap}"), OrientedCloud::together(&parts), gap)
 }
 
 /// A hollow ball: a unit sphere around a sphere of radius `share`, whose normals point into the cavity.
@@ -141,5 +141,5 @@ pub fn nested_spheres(n: usize, share: f64, seed: u64) -> Case {
         sphere([0.0; 3], share, n_inner, &mut random).inside_out(),
     ];
     let gap = (1.0 - share) / surface_spacing(2.0 * TAU, n - n_inner);
-    Case::new(format!("nested spheres, {share}"), Sided::together(&parts), gap)
+    Case::new(format!("nested spheres, {share}"), OrientedCloud::together(&parts), gap)
 }

@@ -10,12 +10,12 @@ use crate::common::random::Random;
 pub type Place = ([f64; 2], [f64; 2]);
 
 /// A cloud with its outward unit normals, `[n, d]`.
-pub struct Sided {
+pub struct OrientedCloud {
     pub cloud: Cloud,
     pub normals: Vec<f64>,
 }
 
-impl Sided {
+impl OrientedCloud {
     fn of<const D: usize>(places: impl IntoIterator<Item = ([f64; D], [f64; D])>) -> Self {
         let (points, normals): (Vec<_>, Vec<_>) = places.into_iter().unzip();
         Self { cloud: Cloud::new(points.concat(), D).unwrap(), normals: normals.concat() }
@@ -43,13 +43,13 @@ impl Sided {
 }
 
 /// n points of the closed curve `r(t) (cos t, sin t)`, at random t or at equal steps.
-pub fn polar(r: impl Fn(f64) -> f64, n: usize, random: Option<&mut Random>) -> Sided {
+pub fn polar(r: impl Fn(f64) -> f64, n: usize, random: Option<&mut Random>) -> OrientedCloud {
     let angles: Vec<f64> = match random {
         Some(random) => (0..n).map(|_| random.angle()).collect(),
         None => (0..n).map(|i| TAU * i as f64 / n as f64).collect(),
     };
     const STEP: f64 = 1e-5;
-    Sided::of(angles.into_iter().map(|t| {
+    OrientedCloud::of(angles.into_iter().map(|t| {
         let (s, c) = t.sin_cos();
         let (radius, slope) = (r(t), (r(t + STEP) - r(t - STEP)) / (2.0 * STEP));
         let length = radius.hypot(slope);
@@ -147,7 +147,7 @@ pub fn half_cone() -> Vec<Place> {
 }
 
 /// n random points, uniform in area, of flat triangles whose corners turn to the left as seen from outside.
-pub fn faceted(triangles: &[[[f64; 3]; 3]], n: usize, random: &mut Random) -> Sided {
+pub fn faceted(triangles: &[[[f64; 3]; 3]], n: usize, random: &mut Random) -> OrientedCloud {
     let arm = |a: [f64; 3], b: [f64; 3]| [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
     let normal = |&[a, b, c]: &[[f64; 3]; 3]| {
         let (u, v) = (arm(a, b), arm(a, c));
@@ -168,7 +168,7 @@ pub fn faceted(triangles: &[[[f64; 3]; 3]], n: usize, random: &mut Random) -> Si
         let at = |c: usize| of[0][c] + s * (of[1][c] - of[0][c]) + t * (of[2][c] - of[0][c]);
         places.push(([at(0), at(1), at(2)], normal.map(|c| c / length(normal))));
     }
-    Sided::of(places)
+    OrientedCloud::of(places)
 }
 
 /// A circle with a radius about (at, 0).
@@ -181,15 +181,15 @@ pub fn ring(at: f64, radius: f64) -> Vec<Place> {
 }
 
 /// Random points of an outline, uniform in length.
-pub fn along(outline: &[Place], n: usize, random: &mut Random) -> Sided {
+pub fn along(outline: &[Place], n: usize, random: &mut Random) -> OrientedCloud {
     let lot = Lot::of(outline, |_| 1.0);
-    Sided::of((0..n).map(|_| lot.draw(random)))
+    OrientedCloud::of((0..n).map(|_| lot.draw(random)))
 }
 
 /// Random points, uniform in area, of the surface that an outline sweeps when turned about x = 0.
-pub fn revolved(outline: &[Place], n: usize, random: &mut Random) -> Sided {
+pub fn revolved(outline: &[Place], n: usize, random: &mut Random) -> OrientedCloud {
     let lot = Lot::of(outline, |x| x[0]);
-    Sided::of((0..n).map(|_| {
+    OrientedCloud::of((0..n).map(|_| {
         let ((x, normal), (s, c)) = (lot.draw(random), random.angle().sin_cos());
         ([x[0] * c, x[0] * s, x[1]], [normal[0] * c, normal[0] * s, normal[1]])
     }))
@@ -214,8 +214,8 @@ pub fn length_around(curve: &Cloud) -> f64 {
 }
 
 /// n random points of a sphere.
-pub fn sphere(centre: [f64; 3], radius: f64, n: usize, random: &mut Random) -> Sided {
-    Sided::of((0..n).map(|_| {
+pub fn sphere(centre: [f64; 3], radius: f64, n: usize, random: &mut Random) -> OrientedCloud {
+    OrientedCloud::of((0..n).map(|_| {
         let normal = random.on_sphere();
         ([0, 1, 2].map(|c| centre[c] + radius * normal[c]), normal)
     }))

@@ -10,7 +10,7 @@ use gramian_numerics::surface::flags::{Flag, FlagReason};
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
 use gramian_numerics::surface::local::{Given, LocalSurface};
 
-use super::clouds::Sided;
+use super::clouds::OrientedCloud;
 use crate::common::fits::{default_kernel_and_alpha, factorize, surface};
 
 const NORMALS: GeometryRequest = GeometryRequest { checks_curvatures: false, ..GeometryRequest::CURVATURES };
@@ -33,19 +33,19 @@ const OFF: f64 = 0.866;
 
 impl SideTally {
     /// Counts sides by the signature function with default parameters.
-    pub fn dense(sided: &Sided) -> Self {
+    pub fn dense(sided: &OrientedCloud) -> Self {
         let (kernel, alpha) = default_kernel_and_alpha(&sided.cloud, Purpose::Normals);
         Self::of(&surface(&factorize(&sided.cloud, kernel, alpha)), sided)
     }
 
     /// Counts sides by local regressions.
-    pub fn local(sided: &Sided) -> Self {
+    pub fn local(sided: &OrientedCloud) -> Self {
         let cloud = Arc::new(sided.cloud.clone());
         let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
         Self::of(&LocalSurface::of(cloud, sampling, Given::default(), &Unobserved).unwrap().into(), sided)
     }
 
-    fn of(surface: &Surface, sided: &Sided) -> Self {
+    fn of(surface: &Surface, sided: &OrientedCloud) -> Self {
         let geometry = Geometry::of(surface, &sided.cloud, &NORMALS, &Unobserved).unwrap();
         let (n, d) = (sided.cloud.n_points(), sided.cloud.dimension());
         let mut is_flagged = vec![false; n];

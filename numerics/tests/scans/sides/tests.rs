@@ -11,7 +11,7 @@ use super::cases::{
     Case, box_faces, cone, curves, folded_curve, folded_sheet, lens, nested_spheres, noisy_curves, plate,
     pyramid, tube, two_spheres,
 };
-use super::clouds::{Sided, faceted};
+use super::clouds::{OrientedCloud, faceted};
 use super::tally::SideTally;
 use crate::common::random::Random;
 
@@ -79,7 +79,7 @@ fn unit_and_place_of_a_noisy_curve_do_not_matter() {
         for (unit, offset) in [(1.0, 1e6), (1e-9, 0.0), (1e9, -1e12)] {
             let moved = sided.cloud.coordinates().iter().map(|x| unit * x + offset).collect();
             let normals = sided.normals.clone();
-            let tally = way(&Sided { cloud: Cloud::new(moved, 2).unwrap(), normals });
+            let tally = way(&OrientedCloud { cloud: Cloud::new(moved, 2).unwrap(), normals });
             let is_same = tally.n_flipped == own.n_flipped && tally.n_flagged.abs_diff(own.n_flagged) <= 2;
             assert!(is_same, "{unit}, {offset}: {tally:?} and {own:?}");
         }
@@ -148,7 +148,7 @@ fn folded_sheets_have_right_sides() {
     check_local(folded_sheet(3, 4.0, 1));
 }
 
-fn is_open(sided: &Sided) -> bool {
+fn is_open(sided: &OrientedCloud) -> bool {
     let cloud = Arc::new(sided.cloud.clone());
     let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
     LocalSurface::of(cloud, sampling, Given::default(), &Unobserved).unwrap().orientation().is_open

@@ -9,7 +9,7 @@ use axum::response::{IntoResponse, Response};
 use crate::http::problem::Problem;
 use crate::http::problem::catalogue;
 use gramian_host::wire::compression::Compressor;
-use gramian_host::wire::etag::is_known;
+use gramian_host::wire::etag::if_none_match;
 use gramian_host::wire::negotiation::{Coding, accepted_text_coding};
 
 pub const HTML: &str = "text/html; charset=utf-8";
@@ -45,12 +45,12 @@ pub struct Site {
     /// Content security policy of all files.
     policy: &'static str,
     /// All files, compressed at the first request for any.
-    packed: LazyLock<Vec<Packed>>,
+    packed: LazyLock<Vec<EncodedFile>>,
 }
 
 impl Site {
     /// `pack` is to return [`packed`] files.
-    pub const fn new(policy: &'static str, pack: fn() -> Vec<Packed>) -> Self {
+    pub const fn new(policy: &'static str, pack: fn() -> Vec<EncodedFile>) -> Self {
         Self { policy, packed: LazyLock::new(pack) }
     }
 
@@ -66,12 +66,12 @@ impl Site {
 }
 
 /// Compresses files.
-pub fn packed(files: &'static [File]) -> Vec<Packed> {
-    files.iter().map(Packed::of).collect()
+pub fn packed(files: &'static [File]) -> Vec<EncodedFile> {
+    files.iter().map(EncodedFile::of).collect()
 }
 
 /// A file as it is sent.
-pub struct Packed {
+pub struct EncodedFile {
     file: &'static File,
     /// Weak, since it stands for every coding.
     etag: String,
@@ -79,7 +79,7 @@ pub struct Packed {
     zstd: Bytes,
 }
 
-impl Packed {
+impl EncodedFile {
     fn of(file: &'static File) -> Self {
         let hash = blake3::hash(file.bytes).to_hex();
         Self {
@@ -105,7 +105,7 @@ impl Packed {
             (header::VARY, HeaderValue::from_static("accept-encoding")),
             (header::CONTENT_SECURITY_POLICY, HeaderValue::from_static(policy)),
         ];
-        if is_known(headers, &self.etag) {
+        if if_none_match(headers, &self.etag) {
             return (StatusCode::NOT_MODIFIED, etag, common).into_response();
         }
         let coding = accepted_text_coding(headers);

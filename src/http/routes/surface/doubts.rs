@@ -5,12 +5,12 @@ use crate::http::problem::Problem;
 use crate::http::serve::answers::surface::SurfaceGeometry;
 use crate::http::serve::fitted::Fits;
 use gramian_host::compute::JobObserver;
-use gramian_numerics::operators::{Judged, Operator};
+use gramian_numerics::operators::{Operator, OperatorAnswers};
 
 /// Answers of an operator that may be doubtful.
-pub struct Doubted<'a> {
+pub struct DoubtfulAnswers<'a> {
     pub operator: Operator,
-    pub judged: Judged<'a>,
+    pub judged: OperatorAnswers<'a>,
     /// Values at the points of the client's cloud.
     pub values: &'a [f64],
     /// Standard deviations of the answers, if they are known.
@@ -25,12 +25,12 @@ pub struct Doubted<'a> {
 /// # Errors
 /// 503 or 504 if the computation is cancelled because nobody waits for it any more.
 pub fn flags(
-    doubted: Doubted<'_>,
+    doubted: DoubtfulAnswers<'_>,
     fits: &Fits,
     surface: &SurfaceGeometry,
     observer: &JobObserver,
 ) -> Result<Vec<Flag>, Problem> {
-    let Doubted { operator, judged, values, deviations } = doubted;
+    let DoubtfulAnswers { operator, judged, values, deviations } = doubted;
     let refused = |error| fits.main.refused(error);
     let mut flags = surface.flags();
     if let Some(deviations) = deviations {
@@ -40,8 +40,9 @@ pub fn flags(
     let learned = fits.learned_beside(values, observer);
     // `Ok(None)` means that the kernel was learned, so its deviations already express what the values say.
     if !matches!(learned, Ok(None)) || deviations.is_none() {
-        let judge =
-            |learned: &Option<_>| Judged { learned: learned.as_ref(), ..judged }.judge(operator, observer);
+        let judge = |learned: &Option<_>| {
+            OperatorAnswers { learned: learned.as_ref(), ..judged }.judge(operator, observer)
+        };
         let uncertain = learned.and_then(|learned| judge(&learned));
         surface.flag_uncertain(uncertain, &mut flags).map_err(refused)?;
     }

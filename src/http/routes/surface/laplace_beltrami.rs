@@ -5,7 +5,7 @@ use serde::Deserialize;
 use utoipa::ToSchema;
 
 use super::operator::{
-    Applied, AppliedAnswer, AppliedWork, MatrixAnswer, MatrixWork, SparseAnswer, StencilWork,
+    AppliedAnswer, AppliedWork, MatrixAnswer, MatrixWork, OperatorParts, SparseAnswer, StencilWork,
 };
 use crate::http::fields::{Diagnostics, Fit, Flag, MeanChoice, Surface, ValuesInclude, request};
 use crate::http::problem::Problem;
@@ -129,7 +129,8 @@ impl Operation for LaplaceBeltramiRequest {
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<AppliedWork>, Problem> {
         let values = std::mem::take(&mut self.values);
         let fit = Fit { mean: self.mean, ..self.take_fit() };
-        let applied = Applied { surface: self.surface, values, queries: self.queries, include: self.include };
+        let applied =
+            OperatorParts { surface: self.surface, values, queries: self.queries, include: self.include };
         AppliedWork::plan(planner, OPERATOR, fit, applied)
     }
 

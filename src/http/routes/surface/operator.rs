@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::common::{asked_of, check_is_surface, geometry_request};
-use super::doubts::{Doubted, flags};
+use super::doubts::{DoubtfulAnswers, flags};
 use crate::http::fields::{Diagnostics, Fit, Flag, OrientationChoice, StencilsUsed, Surface, ValuesInclude};
 use crate::http::problem::Problem;
 use crate::http::serve::answers::surface::SurfaceGeometry;
@@ -20,7 +20,7 @@ use gramian_numerics::machine::price::Sizes;
 use gramian_numerics::model::Report;
 use gramian_numerics::model::price::{OperatorAsked, operator_price};
 use gramian_numerics::operators::price::{matrix_price, n_entries_per_row, stencils_price};
-use gramian_numerics::operators::{Judged, Kriged, OfKriged, Operator, SparseMatrix};
+use gramian_numerics::operators::{KrigedFunction, OfKriged, Operator, OperatorAnswers, SparseMatrix};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::neighbours::Neighbours;
 use gramian_numerics::points::sampling::{Sampling, sampling_price};
@@ -36,7 +36,7 @@ pub struct AppliedWork {
 }
 
 /// The parts of a request to apply an operator that are not its fit.
-pub struct Applied {
+pub struct OperatorParts {
     pub surface: Option<Surface>,
     pub values: Vec<f64>,
     pub queries: Option<Points>,
@@ -94,9 +94,9 @@ impl AppliedWork {
         planner: &Planner<'_>,
         operator: Operator,
         fit: Fit,
-        applied: Applied,
+        applied: OperatorParts,
     ) -> Result<Plan<Self>, Problem> {
-        let Applied { surface: given, values, queries, include } = applied;
+        let OperatorParts { surface: given, values, queries, include } = applied;
         let has_deviations = include.is_some_and(|include| include.contains(&ValuesInclude::Std));
         let request = GeometryRequest { has_deviations, ..operator_request(&given) };
         let OperatorFits { mut main, values, mut surface } =
@@ -169,7 +169,7 @@ struct Applying<'a> {
 }
 
 /// Results of an operator at the queries, with deviations, flags and a report.
-struct Found {
+struct OperatorResult {
     values: Vec<f64>,
     deviations: Option<Vec<f64>>,
     flags: Vec<Flag>,
@@ -186,8 +186,9 @@ impl Applying<'_> {
         let values = operator.apply(geometry, interpolant, queries, observer).map_err(refused)?;
         let deviations = || operator.deviations(geometry, interpolant, factor, queries, observer);
         let deviations = work.request.has_deviations.then(deviations).transpose().map_err(refused)?;
-        let judged = Judged { geometry, interpolant, factor, queries, found: &values, learned: None };
-        let doubted = Doubted {
+        let judged =
+            OperatorAnswers { geometry, interpolant, factor, queries, found: &values, learned: None };
+        let doubted = DoubtfulAnswers {
             operator: *operator,
             judged,
             values: &work.values.list,
@@ -195,7 +196,7 @@ impl Applying<'_> {
         };
         let flags = flags(doubted, fits, surface, observer)?;
         let report = Report::of_function(&interpolant.solver, &interpolant.solution, factor);
-        Ok(self.answer(Found { values, deviations, flags, report }))
+        Ok(self.answer(OperatorResult { values, deviations, flags, report }))
     }
 
     fn by_kriging(&self, moving: &LocalKriging, observer: &JobObserver) -> Result<AppliedAnswer, Problem> {
@@ -204,7 +205,7 @@ impl Applying<'_> {
         let plan = &fits.main.plan;
         let merged = plan.merged(&work.values.list);
         let (trend, factor) = (plan.trend(), plan.process.scale);
-        let function = Kriged { moving, values: &merged, trend, factor };
+        let function = KrigedFunction { moving, values: &merged, trend, factor };
         let found = operator.on_kriged(&surface.geometry, function, &work.queries, observer);
         let OfKriged { values, deviations, uncertain, n_dependent } = found.map_err(refused)?;
         let mut flags = surface.flags();
@@ -216,12 +217,12 @@ impl Applying<'_> {
             ..Report::default()
         };
         let deviations = work.request.has_deviations.then_some(deviations);
-        Ok(self.answer(Found { values, deviations, flags, report }))
+        Ok(self.answer(OperatorResult { values, deviations, flags, report }))
     }
 
-    fn answer(&self, found: Found) -> AppliedAnswer {
+    fn answer(&self, found: OperatorResult) -> AppliedAnswer {
         let Self { work, operator, fits, surface } = self;
-        let Found { values, deviations, flags, report } = found;
+        let OperatorResult { values, deviations, flags, report } = found;
         let (m, d) = (work.queries.n_points(), work.queries.dimension());
         let shape = match operator {
             Operator::LaplaceBeltrami => vec![m],

@@ -13,7 +13,7 @@ use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::plan::Cost;
-use crate::http::serve::planner::{GivenValues, Planner, Restricted};
+use crate::http::serve::planner::{GivenValues, Planner, RestrictedQuantity};
 use gramian_host::compute::JobObserver;
 use gramian_host::wire::write::array::Array;
 use gramian_host::wire::write::json::Nullable;
@@ -220,7 +220,7 @@ impl Operation for ModelSelectionRequest {
         }
         let given = GivenValues::one(std::mem::take(&mut self.values));
         let fit = Fit { mean: self.mean, ..self.take_fit() };
-        let restricted = Restricted {
+        let restricted = RestrictedQuantity {
             name: "model selection",
             pointer: "/solver",
             without: &[SolverKind::Local, SolverKind::Iterative],

@@ -13,7 +13,7 @@ use crate::store::objects::factors::{FactorHead, FactorName, FoundFactor};
 use crate::store::prepared::PreparedFit;
 use gramian_host::compute::Admission;
 use gramian_host::store::pieces::HASH_BYTES;
-use gramian_host::store::{Damaged, Unavailable};
+use gramian_host::store::{DamagedObject, Unavailable};
 use gramian_numerics::model::Model;
 use gramian_numerics::regression::solver::{FactorBuilder, Solver, System};
 
@@ -28,7 +28,7 @@ const WRITTEN: usize = 1 << 20;
 
 /// Reason why a factor could not be read.
 enum Lost {
-    Damaged(Damaged),
+    Damaged(DamagedObject),
     Unavailable(Unavailable),
     /// The factor was deleted meanwhile, there is no memory, or a job ended in a panic.
     Gone,
@@ -85,7 +85,7 @@ async fn read(
     let mut reading = app.compute.run_small(owner, begin).await.ok().flatten().ok_or(Lost::Gone)?;
     let expected = reading.at + 8 * (n_points + reading.builder.n_missing()) as u64 + HASH_BYTES as u64;
     if head.n_points != n_points || n_bytes != expected {
-        return Err(Lost::Damaged(Damaged("its length is wrong")));
+        return Err(Lost::Damaged(DamagedObject("its length is wrong")));
     }
     let end = n_bytes - HASH_BYTES as u64;
     while reading.at < end {
@@ -97,11 +97,11 @@ async fn read(
     let hash = durable.objects.factor_range(name, end..n_bytes).await?.ok_or(Lost::Gone)?;
     let Reading { builder, hasher, weights, .. } = reading;
     if hasher.finalize().as_bytes()[..] != hash[..] {
-        return Err(Lost::Damaged(Damaged("its checksum does not match")));
+        return Err(Lost::Damaged(DamagedObject("its checksum does not match")));
     }
     let restored =
         Solver::restore(builder, system.clone(), weights, head.norm1(), head.reciprocal_condition());
-    restored.map(Some).ok_or(Lost::Damaged(Damaged("it is not a factor of its system")))
+    restored.map(Some).ok_or(Lost::Damaged(DamagedObject("it is not a factor of its system")))
 }
 
 /// A factor that has been read in part.

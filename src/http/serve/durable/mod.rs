@@ -13,7 +13,7 @@ use crate::http::problem::Problem;
 use crate::http::problem::catalogue;
 use crate::http::state::app::App;
 use crate::http::state::durable::Durable;
-use crate::store::clouds::{CloudPage, Holder, Kept, Recalled, RegisteredCloud};
+use crate::store::clouds::{CloudLookup, CloudPage, Holder, RegisteredCloud, StoreOutcome};
 use crate::store::key::CloudId;
 use crate::store::objects::cloud_object::{decode, encode, object_bytes};
 use crate::store::objects::{ListWindow, Swept};
@@ -35,7 +35,7 @@ const READING: usize = 3;
 pub const TRUST: Duration = Duration::from_secs(10);
 
 /// Time for which an object waits for memory before the request is refused.
-const PATIENCE: Duration = Duration::from_secs(1);
+const MEMORY_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Flops for hashing and copying one byte.
 const FLOPS_PER_BYTE: f64 = 8.0;
@@ -56,12 +56,12 @@ pub async fn find_cloud(
 ) -> Result<Option<Arc<RegisteredCloud>>, Problem> {
     let Some(Durable { objects, .. }) = &app.durable else { return Ok(app.clouds.get(owner, id)) };
     match app.clouds.recall(objects, &holder_of(app, owner), id, TRUST).await {
-        Recalled::LocalJob(cloud) => return Ok(Some(cloud)),
-        Recalled::Gone => {
+        CloudLookup::LocalJob(cloud) => return Ok(Some(cloud)),
+        CloudLookup::Gone => {
             forget_results(app, owner, id);
             return Ok(None);
         }
-        Recalled::Unknown => {}
+        CloudLookup::Unknown => {}
     }
     let read = || read_cloud(app.clone(), owner, id);
     app.clouds.get_or_read(owner, id, read).await
@@ -100,7 +100,7 @@ async fn reserve_for_reading(
         return Err(Problem::internal());
     }
     let mut memory = app.intake.try_reserve(owner, 0).ok_or_else(Problem::internal)?;
-    if app.intake.grow(&mut memory, n_reserved, PATIENCE).await {
+    if app.intake.grow(&mut memory, n_reserved, MEMORY_TIMEOUT).await {
         Ok(memory)
     } else {
         Err(app.compute.out_of_memory())
@@ -140,17 +140,17 @@ pub async fn keep(app: &Arc<App>, owner: Owner, cloud: &Arc<RegisteredCloud>) ->
         }
         let encode = || encoded(&app, owner, &cloud);
         match app.clouds.keep(&durable.objects, &holder, &cloud, encode).await {
-            Kept::Known => Ok(false),
-            Kept::Deleted => Ok(true),
-            Kept::Written(n_bytes) => {
+            StoreOutcome::Known => Ok(false),
+            StoreOutcome::Deleted => Ok(true),
+            StoreOutcome::Written(n_bytes) => {
                 durable.grew_by(n_bytes, app.config.retention());
                 Ok(true)
             }
-            Kept::Pending(reason) => {
+            StoreOutcome::Pending(reason) => {
                 durable.fell_behind(&reason);
                 Ok(true)
             }
-            Kept::Nowhere(reason) => {
+            StoreOutcome::Nowhere(reason) => {
                 durable.fell_behind(&reason);
                 let detail =
                     "the store of clouds does not answer, and memory is full of clouds that are not stored yet";
@@ -275,9 +275,11 @@ async fn offer_again(app: &Arc<App>, durable: &Durable, owner: Owner) {
     for cloud in app.clouds.unstored(owner) {
         let encode = || encoded(app, owner, &cloud);
         match app.clouds.offer(&durable.objects, &holder, &cloud, encode).await {
-            Some(Kept::Written(n_bytes)) => durable.grew_by(n_bytes, app.config.retention()),
-            Some(Kept::Pending(reason) | Kept::Nowhere(reason)) => durable.fell_behind(&reason),
-            Some(Kept::Known | Kept::Deleted) | None => {}
+            Some(StoreOutcome::Written(n_bytes)) => durable.grew_by(n_bytes, app.config.retention()),
+            Some(StoreOutcome::Pending(reason) | StoreOutcome::Nowhere(reason)) => {
+                durable.fell_behind(&reason)
+            }
+            Some(StoreOutcome::Known | StoreOutcome::Deleted) | None => {}
         }
     }
 }

@@ -17,7 +17,7 @@ use gramian_numerics::model::price::MakingPrice;
 use gramian_numerics::observer::Observer;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::duplicates::{Merge, RowCopy};
-use gramian_numerics::regression::selection::Learned;
+use gramian_numerics::regression::selection::LearnedModel;
 use gramian_numerics::regression::solver::Disagreement;
 use gramian_numerics::regression::solver::trend::{Mean, Trend};
 use gramian_numerics::regression::sums::regularization::Regularization;
@@ -54,7 +54,7 @@ pub struct Process {
     pub values: Option<Arc<Values>>,
     /// Kernel, noise and mean learned from the values. If kernel and noise are given, only the mean was
     /// learned.
-    pub(super) learned: Option<Arc<Learned>>,
+    pub(super) learned: Option<Arc<LearnedModel>>,
     /// Whether the noise was learned too.
     pub(super) has_learned_noise: bool,
 }
@@ -125,7 +125,7 @@ impl FitPlan {
     }
 
     /// Returns what was learned from the values, for a solver that never sees all of them at once.
-    fn learned_of_local(&self) -> Option<&Learned> {
+    fn learned_of_local(&self) -> Option<&LearnedModel> {
         self.process.learned.as_deref().filter(|_| self.recipe.is_kriged_locally())
     }
 

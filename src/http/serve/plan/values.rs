@@ -17,7 +17,9 @@ use gramian_numerics::model::{Recipe, ScaledProcess};
 use gramian_numerics::observer::Observer;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
-use gramian_numerics::regression::selection::{Learned, Noise, Observed, is_table, learn, learn_mean};
+use gramian_numerics::regression::selection::{
+    LearnedModel, Noise, ObservedCloud, is_table, learn, learn_mean,
+};
 use gramian_numerics::regression::solver::trend::Mean;
 use gramian_numerics::regression::sums::regularization::Regularization;
 
@@ -43,7 +45,7 @@ pub struct PlannedValues {
     pub(in crate::http::serve) reason: Option<AutoReason>,
     pub(in crate::http::serve) mean: Mean,
     pub(in crate::http::serve) values: Option<Arc<Values>>,
-    pub(in crate::http::serve) learned: Option<Arc<Learned>>,
+    pub(in crate::http::serve) learned: Option<Arc<LearnedModel>>,
 }
 
 /// Values to learn from, with the parameters that are given.
@@ -138,8 +140,11 @@ impl PlannedValues {
 }
 
 impl Learning {
-    pub(in crate::http::serve) fn learn(&self, observer: &dyn Observer) -> Result<Learned, NumericsError> {
-        let observed = Observed {
+    pub(in crate::http::serve) fn learn(
+        &self,
+        observer: &dyn Observer,
+    ) -> Result<LearnedModel, NumericsError> {
+        let observed = ObservedCloud {
             cloud: &self.cloud,
             sampling: &self.sampling,
             values: &self.values.list,

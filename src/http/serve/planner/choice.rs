@@ -14,13 +14,13 @@ use gramian_numerics::regression::sums::regularization::Regularization;
 
 /// A requested quantity that not every solver provides: its name, the pointer to it, and the solvers without.
 #[derive(Debug, Clone, Copy)]
-pub struct Restricted {
+pub struct RestrictedQuantity {
     pub name: &'static str,
     pub pointer: &'static str,
     pub without: &'static [SolverKind],
 }
 
-impl Restricted {
+impl RestrictedQuantity {
     /// Returns 422 where the request asks a solver for this quantity that does not provide it.
     pub(super) fn refused_by(self, solver: SolverKind) -> Problem {
         let why = match solver {

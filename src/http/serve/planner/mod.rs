@@ -16,7 +16,7 @@ use crate::http::problem::{Problem, dimension_mismatch};
 use crate::http::state::app::App;
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::{CloudId, GivenKernel, ValuesKey};
-pub use choice::Restricted;
+pub use choice::RestrictedQuantity;
 use choice::{
     FitOptions, TRY_LOCAL, checked_tolerance, local_lacks_operators, only_local_finds_edges,
     only_local_learns, pointers_of, pointers_of_surface,
@@ -38,12 +38,12 @@ pub use landmarks::{LandmarkProbe, ValuesUse};
 pub struct Planner<'a> {
     pub app: &'a App,
     pub owner: Owner,
-    known: Known,
+    known: RequestClouds,
 }
 
 /// What is known of the clouds of a request before it is planned.
 #[derive(Default)]
-pub struct Known {
+pub struct RequestClouds {
     /// Clouds that memory may have dropped again.
     pub clouds: Vec<Arc<RegisteredCloud>>,
     /// Clouds of the request that are only in memory, or were not seen in the store lately.
@@ -54,15 +54,15 @@ pub struct Known {
 
 impl<'a> Planner<'a> {
     pub fn new(app: &'a App, owner: Owner) -> Self {
-        Self { app, owner, known: Known::default() }
+        Self { app, owner, known: RequestClouds::default() }
     }
 
     /// Creates a planner that knows something of the clouds of its request.
-    pub fn knowing(app: &'a App, owner: Owner, known: Known) -> Self {
+    pub fn knowing(app: &'a App, owner: Owner, known: RequestClouds) -> Self {
         Self { app, owner, known }
     }
 
-    pub fn into_known(self) -> Known {
+    pub fn into_known(self) -> RequestClouds {
         self.known
     }
 
@@ -79,7 +79,7 @@ impl<'a> Planner<'a> {
         &self,
         mut fit: Fit,
         given: GivenValues,
-        restricted: Option<Restricted>,
+        restricted: Option<RestrictedQuantity>,
     ) -> Result<(PlannedValues, Arc<Values>), Problem> {
         let on = self.fitted_cloud(&mut fit)?;
         let solver = self.solver_of_values(&fit, &on);
@@ -123,12 +123,12 @@ impl<'a> Planner<'a> {
     ) -> Result<PlannedSurface, Problem> {
         let learning = self.learning(&mut options, &on.stored.cloud)?;
         let choice = match self.choice_of_surface(&on, &options, purpose, request)? {
-            Regressed::Locally(reason) => {
+            LocalDecision::Locally(reason) => {
                 let learning = learning.map(|(_, learning)| learning);
                 SurfaceSource::Regressions { reason, learning }
             }
-            Regressed::No if let Some((member, _)) = learning => return Err(only_local_learns(member)),
-            Regressed::No => {
+            LocalDecision::No if let Some((member, _)) = learning => return Err(only_local_learns(member)),
+            LocalDecision::No => {
                 let solver = of_whole(options.solver);
                 if solver == SolverKind::Dense {
                     self.check_max_dense_points(&on)?;
@@ -166,7 +166,7 @@ impl<'a> Planner<'a> {
         options: &FitOptions,
         purpose: Purpose,
         request: &GeometryRequest,
-    ) -> Result<Regressed, Problem> {
+    ) -> Result<LocalDecision, Problem> {
         let (n_points, dimension) = (on.stored.cloud.n_points(), on.stored.cloud.dimension());
         let given = options.given_process(on.pointers);
         if options.solver == SolverChoice::Local || request.model == SurfaceModel::Regression {
@@ -183,7 +183,7 @@ impl<'a> Planner<'a> {
                               the surface model \"signature\"";
                 return Err(Problem::of_field(catalogue::UNSUPPORTED_BY_SOLVER, pointer, detail));
             }
-            return Ok(Regressed::Locally(None));
+            return Ok(LocalDecision::Locally(None));
         }
         let is_named =
             options.solver != SolverChoice::Auto || request.model != SurfaceModel::Auto || given.is_some();
@@ -191,7 +191,7 @@ impl<'a> Planner<'a> {
             return Err(only_local_finds_edges());
         }
         if is_named {
-            return Ok(Regressed::No);
+            return Ok(LocalDecision::No);
         }
         let only_regressed = match (request.has_edge_normals, request.has_deviations) {
             (true, _) => Some(AutoReason::EdgeNormals),
@@ -200,8 +200,8 @@ impl<'a> Planner<'a> {
         };
         let surface = UnfittedSurface { n_points, dimension, purpose, only_regressed };
         Ok(match prefers_local(&surface, self.app.config.max_dense_points) {
-            None => Regressed::No,
-            reason => Regressed::Locally(reason),
+            None => LocalDecision::No,
+            reason => LocalDecision::Locally(reason),
         })
     }
 
@@ -280,7 +280,7 @@ impl<'a> Planner<'a> {
             return Err(local_lacks_operators("/solver"));
         }
         if fit.solver == SolverChoice::Iterative {
-            return Err(Restricted {
+            return Err(RestrictedQuantity {
                 name: "matrices",
                 pointer: "/solver",
                 without: &[SolverKind::Iterative],
@@ -441,7 +441,7 @@ fn of_whole(choice: SolverChoice) -> SolverKind {
 }
 
 /// Decision for or against local regressions of a surface.
-enum Regressed {
+enum LocalDecision {
     No,
     /// Local regressions, with the reason where `auto` chose them.
     Locally(Option<AutoReason>),

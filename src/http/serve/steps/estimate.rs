@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::parsed::Parsed;
+use super::parsed::ParsedRequest;
 use super::{OnCall, Step};
 use crate::http::problem::Problem;
 use crate::http::serve::durable::keep_all;
@@ -42,7 +42,7 @@ pub async fn estimate(
         let (body, memory) = body.unpack(&on.app, observer)?;
         let request = parse_named(&body, &on.app.context(observer))?;
         drop(body);
-        Parsed::begin(on, request, memory, observer)
+        ParsedRequest::begin(on, request, memory, observer)
     };
     let mut step = on.run(flops, parse).await?;
     let resolved = loop {

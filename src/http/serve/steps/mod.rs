@@ -1,5 +1,5 @@
-//! The steps of a request that needs models, a type for each: `Parsed → Planned → Resolved`, and then
-//! [`Ready`](gramian_host::operation::Ready).
+//! The steps of a request that needs models, a type for each: `ParsedRequest → PlannedRequest →
+//! ResolvedRequest`, and then [`Ready`](gramian_host::operation::Ready).
 //!
 //! Before each step the request awaits what that step needs: clouds from the store, facts about clouds and
 //! values, memory, models. Where nothing has to be awaited, it goes on within the same job. A small request
@@ -29,20 +29,20 @@ use gramian_host::memory::budget::Reservation;
 use gramian_host::operation::{self, Answer, AnyRequest, Call, Next};
 use gramian_host::wire::read::body::UnpackedBody;
 use gramian_host::wire::read::limits::ParseContext;
-use parsed::Parsed;
-use planned::Planned;
-use resolved::Resolved;
+use parsed::ParsedRequest;
+use planned::PlannedRequest;
+use resolved::ResolvedRequest;
 
 /// A step that a request has reached.
 enum Step {
-    Parsed(Box<Parsed>),
-    Planned(Box<Planned>),
-    Resolved(Box<Resolved>),
-    Answer(Box<Answered>),
+    Parsed(Box<ParsedRequest>),
+    Planned(Box<PlannedRequest>),
+    Resolved(Box<ResolvedRequest>),
+    Answer(Box<AnswerToStore>),
 }
 
 /// An answer, with clouds of the request that the store does not have yet.
-struct Answered {
+struct AnswerToStore {
     answer: Answer,
     fresh: Vec<Arc<RegisteredCloud>>,
 }
@@ -81,7 +81,7 @@ impl AnyRequest for OnApp<Box<dyn super::operation::AnyRequest>> {
         observer: &JobObserver,
     ) -> Result<Next, Problem> {
         let Self { app, step: request } = *self;
-        let step = Parsed::begin(&on(&app, call), request, memory, observer)?;
+        let step = ParsedRequest::begin(&on(&app, call), request, memory, observer)?;
         Ok(next(app, step))
     }
 }

@@ -1,12 +1,12 @@
 //! From a parsed request to its plan.
 
-use super::planned::Planned;
+use super::planned::PlannedRequest;
 use super::{OnCall, Step};
 use crate::http::fields::CloudRef;
 use crate::http::problem::Problem;
 use crate::http::serve::durable::{TRUST, find_cloud};
 use crate::http::serve::operation::AnyRequest;
-use crate::http::serve::planner::{Known, LandmarkProbe, Planner};
+use crate::http::serve::planner::{LandmarkProbe, Planner, RequestClouds};
 use crate::http::serve::sampling::find_landmarks;
 use crate::store::key::CloudId;
 use gramian_host::compute::{JobObserver, is_light};
@@ -14,17 +14,17 @@ use gramian_host::memory::budget::Reservation;
 use gramian_numerics::points::duplicates::merging_flops;
 
 /// A parsed request with its memory, and what is known of its clouds.
-pub struct Parsed {
+pub struct ParsedRequest {
     request: Box<dyn AnyRequest>,
     memory: Reservation,
-    known: Known,
+    known: RequestClouds,
     /// Clouds of the request that have to be read from the store before it can be planned.
     absent: Vec<CloudId>,
     /// The question that has to be answered before `auto` can choose a solver.
     probe: Option<Box<LandmarkProbe>>,
 }
 
-impl Parsed {
+impl ParsedRequest {
     /// Plans the request within the job that parsed it, if that is light work.
     ///
     /// # Errors
@@ -35,7 +35,8 @@ impl Parsed {
         memory: Reservation,
         observer: &JobObserver,
     ) -> Result<Step, Problem> {
-        let mut parsed = Self { request, memory, known: Known::default(), absent: Vec::new(), probe: None };
+        let mut parsed =
+            Self { request, memory, known: RequestClouds::default(), absent: Vec::new(), probe: None };
         parsed.absent = parsed.ids_not_in_memory(on);
         if !parsed.absent.is_empty() || !is_light(parsed.planning_flops(on)) {
             return Ok(Step::Parsed(Box::new(parsed)));
@@ -69,7 +70,7 @@ impl Parsed {
         }
         let plan = request.plan(&planner)?;
         let fresh = planner.into_known().fresh.into_inner();
-        Planned::of(plan, memory, fresh).go_on(on, observer)
+        PlannedRequest::of(plan, memory, fresh).go_on(on, observer)
     }
 
     /// Finds the clouds that the request names and memory does not have, if there is a store to look in.

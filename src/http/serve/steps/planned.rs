@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::resolved::Resolved;
+use super::resolved::ResolvedRequest;
 use super::{OnCall, Step};
 use crate::http::problem::Problem;
 use crate::http::serve::operation::{AnyWork, Plan};
@@ -13,7 +13,7 @@ use gramian_host::memory::budget::Reservation;
 use gramian_numerics::observer::Observer;
 
 /// A request that is checked. Its fits are complete as far as the request defines them.
-pub struct Planned {
+pub struct PlannedRequest {
     plan: Plan<Box<dyn AnyWork>>,
     /// Memory of the request until its answer is computed.
     memory: Reservation,
@@ -21,7 +21,7 @@ pub struct Planned {
     fresh: Vec<Arc<RegisteredCloud>>,
 }
 
-impl Planned {
+impl PlannedRequest {
     /// Keeps of `memory` what the plan holds.
     pub fn of(
         plan: Plan<Box<dyn AnyWork>>,
@@ -56,8 +56,8 @@ impl Planned {
         on.run(flops, resolve).await.map(|resolved| Step::Resolved(Box::new(resolved)))
     }
 
-    fn resolved(self, observer: &dyn Observer) -> Result<Resolved, Problem> {
+    fn resolved(self, observer: &dyn Observer) -> Result<ResolvedRequest, Problem> {
         let Self { plan: Plan { fits, work }, memory, fresh } = self;
-        Ok(Resolved { fits: fits.resolve(observer)?, work, memory, fresh })
+        Ok(ResolvedRequest { fits: fits.resolve(observer)?, work, memory, fresh })
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use axum::http::HeaderValue;
 
-use super::{Answered, OnCall, Step};
+use super::{AnswerToStore, OnCall, Step};
 use crate::http::problem::Problem;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::fitting::Fitting;
@@ -17,7 +17,7 @@ use gramian_host::memory::budget::Reservation;
 use gramian_host::operation::{AnswerHeaders, Outlook, Ready};
 
 /// A request whose fits are complete.
-pub struct Resolved {
+pub struct ResolvedRequest {
     pub fits: FitPlans,
     pub work: Box<dyn AnyWork>,
     /// Memory of the request until its answer is computed.
@@ -26,7 +26,7 @@ pub struct Resolved {
     pub fresh: Vec<Arc<RegisteredCloud>>,
 }
 
-impl Resolved {
+impl ResolvedRequest {
     /// Answers small work whose models are ready, within the job that resolved the request.
     ///
     /// # Errors
@@ -41,7 +41,7 @@ impl Resolved {
         };
         let (ready, fresh) = self.with(fits, memory, headers);
         let answer = ready.answer_at_once(&on.call, observer)?;
-        Ok(Step::Answer(Box::new(Answered { answer, fresh })))
+        Ok(Step::Answer(Box::new(AnswerToStore { answer, fresh })))
     }
 
     /// Finds or makes the models, in memory that is reserved for all of them at once.

@@ -17,7 +17,7 @@ use crate::store::key::CloudId;
 use crate::store::objects::CloudObjects;
 use crate::store::testing::choose::{Choose, Odometer};
 use crate::store::testing::random::Random;
-use crate::store::testing::stepped::{Gate, Stepped, Stops};
+use crate::store::testing::stepped::{Gate, SteppedStore, Stops};
 use gramian_host::store::Objects;
 use gramian_numerics::points::cloud::Cloud;
 use object_store::path::Path;
@@ -27,7 +27,7 @@ use tokio::task::JoinHandle;
 /// A store, its processes, and the outcome of each request.
 struct World {
     gate: Arc<Gate>,
-    store: Stepped,
+    store: SteppedStore,
     processes: Vec<Process>,
     under_way: Vec<(usize, JoinHandle<Answer>)>,
     history: Vec<Event>,
@@ -64,7 +64,7 @@ fn id() -> CloudId {
 
 impl World {
     fn new(setting: Setting) -> Self {
-        let (store, gate) = Stepped::new(setting.tells_absence, Stops::default());
+        let (store, gate) = SteppedStore::new(setting.tells_absence, Stops::default());
         let process = |_| {
             let objects = Objects::over(Arc::new(store.clone()), Path::default());
             let objects = CloudObjects(Arc::new(objects));

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
 use super::{cloud, id};
-use crate::store::clouds::{CloudStore, Holder, Kept, Recalled, RegisteredCloud};
+use crate::store::clouds::{CloudLookup, CloudStore, Holder, RegisteredCloud, StoreOutcome};
 use crate::store::key::CloudId;
 use crate::store::objects::cloud_object::{decode, encode};
 use crate::store::objects::{CloudObjects, ListWindow, Retention};
@@ -84,17 +84,19 @@ impl Process {
         let (registered, _) = self.clouds.register(Owner(0), cloud(), None);
         let encode = || encoded(registered.clone());
         match self.clouds.keep(&self.objects, &holder(), &registered, encode).await {
-            Kept::Known => Answer::Posted(false),
-            Kept::Written(_) | Kept::Pending(_) | Kept::Deleted => Answer::Posted(true),
-            Kept::Nowhere(_) => Answer::Unavailable,
+            StoreOutcome::Known => Answer::Posted(false),
+            StoreOutcome::Written(_) | StoreOutcome::Pending(_) | StoreOutcome::Deleted => {
+                Answer::Posted(true)
+            }
+            StoreOutcome::Nowhere(_) => Answer::Unavailable,
         }
     }
 
     async fn get(&self) -> Answer {
         match self.clouds.recall(&self.objects, &holder(), id(), Duration::ZERO).await {
-            Recalled::LocalJob(_) => return Answer::Found(true),
-            Recalled::Gone => return Answer::Found(false),
-            Recalled::Unknown => {}
+            CloudLookup::LocalJob(_) => return Answer::Found(true),
+            CloudLookup::Gone => return Answer::Found(false),
+            CloudLookup::Unknown => {}
         }
         let read = || self.clone().read();
         let found = self.clouds.get_or_read(Owner(0), id(), read).await;

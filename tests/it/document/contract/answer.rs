@@ -7,13 +7,13 @@ use serde_json::Value;
 
 /// An answer, read to its end. The body is as it was sent, compressed or not.
 #[derive(Clone)]
-pub struct Received {
+pub struct AnswerParts {
     pub status: u16,
     pub headers: HeaderMap,
     pub bytes: Vec<u8>,
 }
 
-impl Received {
+impl AnswerParts {
     /// Parses an HTTP/1.1 answer whose body is neither chunked nor compressed.
     pub fn parse(text: &str) -> Self {
         let (head, body) = text.split_once("\r\n\r\n").unwrap();

@@ -39,7 +39,7 @@ pub struct Header {
 }
 
 /// The result of looking up a request in the document.
-pub enum Served<'a> {
+pub enum Lookup<'a> {
     By(&'a Operation),
     /// The path exists, with these methods instead.
     OtherMethods(Vec<String>),
@@ -58,17 +58,17 @@ impl Contract {
     }
 
     /// Finds the operation for a request. A literal path takes precedence over one with parameters.
-    pub fn find(&self, method: &str, path: &str) -> Served<'_> {
+    pub fn find(&self, method: &str, path: &str) -> Lookup<'_> {
         let literal = self.paths.iter().find(|known| known.template == path);
         let Some(known) = literal.or_else(|| self.paths.iter().find(|known| fits(&known.template, path)))
         else {
-            return Served::Nowhere;
+            return Lookup::Nowhere;
         };
         // HEAD is GET without its body, unless it is an operation itself.
         let by_get = || known.operations.get("GET").filter(|_| method == "HEAD");
         match known.operations.get(method).or_else(by_get) {
-            Some(operation) => Served::By(operation),
-            None => Served::OtherMethods(known.methods()),
+            Some(operation) => Lookup::By(operation),
+            None => Lookup::OtherMethods(known.methods()),
         }
     }
 }

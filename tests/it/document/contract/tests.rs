@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use super::document::Contract;
 use super::validator::Validator;
-use super::{BESIDE, Received, is_beside};
+use super::{AnswerParts, BESIDE, is_beside};
 use crate::all_routes::route_of;
 use crate::support::{Server, document, receive};
 
@@ -16,7 +16,7 @@ struct Case {
     contract: Contract,
     method: &'static str,
     path: &'static str,
-    answer: Received,
+    answer: AnswerParts,
 }
 
 impl Case {
@@ -29,11 +29,11 @@ impl Case {
         case
     }
 
-    fn found(&self, answer: &Received) -> Vec<String> {
+    fn found(&self, answer: &AnswerParts) -> Vec<String> {
         self.contract.mismatches(self.method, self.path, answer)
     }
 
-    fn finds(&self, expected: &str, change: impl FnOnce(&mut Received)) {
+    fn finds(&self, expected: &str, change: impl FnOnce(&mut AnswerParts)) {
         let mut answer = self.answer.clone();
         change(&mut answer);
         let found = self.found(&answer).join("\n");
@@ -49,7 +49,7 @@ impl Case {
     }
 }
 
-fn set(answer: &mut Received, name: &'static str, value: &'static str) {
+fn set(answer: &mut AnswerParts, name: &'static str, value: &'static str) {
     answer.headers.insert(name, HeaderValue::from_static(value));
 }
 

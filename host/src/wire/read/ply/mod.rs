@@ -13,7 +13,7 @@ mod header;
 mod rows;
 
 use super::parse::Document;
-use super::reader::Named;
+use super::reader::NamedTable;
 use crate::problem::Problem;
 use crate::problem::catalogue;
 use data::Cursor;
@@ -66,7 +66,7 @@ pub fn read_ply(bytes: &[u8]) -> Result<Document<'_>, Problem> {
     cursor.check_room(vertices).map_err(malformed)?;
     let table = |name: &str, columns| {
         let rows = Rows::new(cursor, vertices.clone(), columns);
-        Named::new(vec![name.to_owned()], Ok(Box::new(rows)))
+        NamedTable::new(vec![name.to_owned()], Ok(Box::new(rows)))
     };
     let points = table("points", coordinates);
     let normals = vertices.columns(NORMAL).map(|columns| table("normals", columns));

@@ -40,7 +40,7 @@ use entries::Entries;
 use object::{GIVEN_TWICE, Members};
 use source::{Source, Tables};
 pub use state::{Reader, Stop};
-pub use table::{Given, Named, Table};
+pub use table::{Given, NamedTable, Table};
 use text::Token;
 
 /// Longest text, in characters, that types see and that errors repeat to clients. No valid text is as long.

@@ -10,7 +10,7 @@ use serde_json::Error;
 
 use super::source::{Source, Tables};
 use super::state::{Operation, Reader};
-use super::table::Named;
+use super::table::NamedTable;
 use super::{Value, shortened};
 
 /// Name of the member that a request can have beside its own.
@@ -72,9 +72,9 @@ impl<'r, 'a> Members<'r, 'a> {
             let Some(name) = next else { return Ok(false) };
             Cow::Owned(name.to_owned())
         };
-        let is_of_name = |table: &Named<'_>| table.name_at(self.depth) == Some(&name);
+        let is_of_name = |table: &NamedTable<'_>| table.name_at(self.depth) == Some(&name);
         let start = self.tables.start + tables.iter().take_while(|table| !is_of_name(table)).count();
-        let n = tables.iter_mut().filter(|table| is_of_name(table)).map(Named::reach).count();
+        let n = tables.iter_mut().filter(|table| is_of_name(table)).map(NamedTable::reach).count();
         self.of_name = Tables { start, end: start + n };
         self.name = shortened(name);
         Ok(true)
@@ -83,7 +83,7 @@ impl<'r, 'a> Members<'r, 'a> {
     /// Where the value of the current member comes from.
     fn source(&mut self) -> Result<Source, Error> {
         let Tables { start, end } = self.of_name;
-        let is_table = |table: &Named<'_>| table.path.len() == self.depth + 1;
+        let is_table = |table: &NamedTable<'_>| table.path.len() == self.depth + 1;
         match (self.is_in_text, self.reader.tables[start..end].iter().any(is_table)) {
             (false, true) if end == start + 1 => self.reader.open(start),
             (_, true) => Err(Error::custom(GIVEN_TWICE)),

@@ -4,7 +4,7 @@ use serde::de::Error as _;
 use serde_json::Error;
 
 use super::source::Source;
-use super::table::{Block, Named};
+use super::table::{Block, NamedTable};
 use super::text::Text;
 use crate::problem::Problem;
 use crate::wire::read::limits::{Excess, ParseContext};
@@ -33,7 +33,7 @@ pub struct Reader<'a> {
     pub(super) context: &'a ParseContext<'a>,
     pub(super) text: Text<'a>,
     /// Those of an object stand side by side.
-    pub(super) tables: Vec<Named<'a>>,
+    pub(super) tables: Vec<NamedTable<'a>>,
     /// Index of the table that is being read, and numbers of it.
     table: usize,
     block: Block,
@@ -71,7 +71,7 @@ impl<'a> Reader<'a> {
 
     /// Adds the numbers of the request, which the text must not have then. Tables of the same object stand
     /// side by side.
-    pub fn with_tables(self, tables: Vec<Named<'a>>) -> Self {
+    pub fn with_tables(self, tables: Vec<NamedTable<'a>>) -> Self {
         Self { tables, are_numbers_in_tables: true, ..self }
     }
 

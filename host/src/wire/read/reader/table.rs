@@ -26,14 +26,14 @@ pub trait Table {
 pub type Given<'a> = Result<Box<dyn Table + 'a>, String>;
 
 /// A table and the names of the members that lead to it, at least one.
-pub struct Named<'a> {
+pub struct NamedTable<'a> {
     pub(super) path: Vec<String>,
     pub(super) table: Given<'a>,
     /// Names of the path that the reader has come to.
     n_reached: usize,
 }
 
-impl<'a> Named<'a> {
+impl<'a> NamedTable<'a> {
     pub fn new(path: Vec<String>, table: Given<'a>) -> Self {
         Self { path, table, n_reached: 0 }
     }

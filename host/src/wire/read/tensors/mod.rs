@@ -10,7 +10,7 @@ use std::borrow::Cow;
 use safetensors::SafeTensors;
 
 use super::parse::Document;
-use super::reader::Named;
+use super::reader::NamedTable;
 use crate::problem::Problem;
 use crate::problem::catalogue;
 use npy::Npy;
@@ -59,7 +59,7 @@ pub fn read_safetensors(bytes: &[u8]) -> Result<Document<'_>, Problem> {
     tensors.sort_by(|(one, _), (other, _)| one.split('.').cmp(other.split('.')));
     let named = tensors.iter().map(|(name, tensor)| {
         let path = name.splitn(MAX_DEPTH, '.').map(str::to_owned).collect();
-        Named::new(path, Tensor::of_view(tensor))
+        NamedTable::new(path, Tensor::of_view(tensor))
     });
     Ok(Document::with_tables(text, named.collect()))
 }
@@ -87,7 +87,7 @@ pub fn read_npy(bytes: &[u8]) -> Result<Document<'_>, Problem> {
     let array = Npy::parse(bytes, MAX_HEADER_BYTES).and_then(Npy::into_table);
     let table =
         array.ok_or_else(|| Problem::new(catalogue::MALFORMED_BODY, "the body is not npy, or ends early"))?;
-    Ok(Document::with_tables(NOTHING.into(), vec![Named::new(vec!["points".to_owned()], table)]))
+    Ok(Document::with_tables(NOTHING.into(), vec![NamedTable::new(vec!["points".to_owned()], table)]))
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::dipoles::ball_volume;
 use crate::machine::vector::{dot, tangent_basis};
 use crate::orientation::edges::{Edge, across, edges_of};
-use crate::orientation::{Sampled, n_neighbours};
+use crate::orientation::{CloudWithNeighbours, n_neighbours};
 use crate::points::cloud::squared_distance;
 use cell::Cell;
 
@@ -34,7 +34,12 @@ const REACH_OF_CELL: f64 = 0.75;
 /// Computes areas in units of radius^{d−1}, `[n]`, from the neighbours of each point on its sheet.
 ///
 /// `normals` are `[n, d]`.
-pub(super) fn areas(sampled: &Sampled<'_>, normals: &[f64], edges: &[Edge], radius: f64) -> Vec<f64> {
+pub(super) fn areas(
+    sampled: &CloudWithNeighbours<'_>,
+    normals: &[f64],
+    edges: &[Edge],
+    radius: f64,
+) -> Vec<f64> {
     let area = |point: usize| {
         let place = Place { sampled, normals, point, own: edges_of(edges, point) };
         match sampled.cloud.dimension() {
@@ -48,7 +53,7 @@ pub(super) fn areas(sampled: &Sampled<'_>, normals: &[f64], edges: &[Edge], radi
 
 /// A point with its edges.
 struct Place<'a> {
-    sampled: &'a Sampled<'a>,
+    sampled: &'a CloudWithNeighbours<'a>,
     normals: &'a [f64],
     point: usize,
     own: &'a [Edge],
@@ -150,7 +155,12 @@ mod tests {
         let normals: Vec<f64> = rough.collect();
         let sampling = Sampling::of(&cloud, &Unobserved).unwrap();
         let around = Neighbourhoods::of(sampling.neighbours(), &cloud, 18, &Unobserved).unwrap();
-        let sampled = Sampled { cloud: &cloud, sampling: &sampling, around: &around, observer: &Unobserved };
+        let sampled = CloudWithNeighbours {
+            cloud: &cloud,
+            sampling: &sampling,
+            around: &around,
+            observer: &Unobserved,
+        };
         areas(&sampled, &normals, &sheet_edges(&sampled, &normals).unwrap(), 1.0)
     }
 

@@ -1,7 +1,7 @@
 //! Batches: the neighbourhoods of several queries side by side, one in each lane.
 
 use super::parts::Parts;
-use super::quantities::Sized;
+use super::quantities::ScaledFunctional;
 use crate::kernel::Kernel;
 use crate::machine::lanes::COLUMNS;
 use crate::machine::small::{Small, zeros};
@@ -104,7 +104,7 @@ impl Batch {
     }
 
     /// Writes the functionals of a query into a lane.
-    pub(super) fn put_functionals(&mut self, lane: usize, functionals: &[Sized], kernel: &Kernel) {
+    pub(super) fn put_functionals(&mut self, lane: usize, functionals: &[ScaledFunctional], kernel: &Kernel) {
         let coefficients = functionals.iter().flat_map(|functional| functional.coefficients(kernel));
         let slots = self.functionals[lane..].iter_mut().step_by(self.lanes);
         slots.zip(coefficients).for_each(|(slot, coefficient)| *slot = coefficient);

@@ -1,7 +1,7 @@
 //! A check that neighbourhoods are large enough.
 
 use super::NEIGHBOURS;
-use super::{Asked, KrigingRequest, LocalKriging, Quantities, Raw};
+use super::{BatchedRequest, KrigingRequest, LocalKriging, Quantities, Raw};
 use crate::error::Result;
 use crate::machine::instruction_set::InstructionSet;
 use crate::observer::Observer;
@@ -43,7 +43,7 @@ impl LocalKriging {
             let order = JetOrder::Value;
             let request = KrigingRequest { order, has_variances: true, has_deviations: false, trend };
             let (set, quantities) = (InstructionSet::best(), Quantities::none());
-            self.run(values, &sample, Asked { set, request, quantities, n_neighbours }, observer)
+            self.run(values, &sample, BatchedRequest { set, request, quantities, n_neighbours }, observer)
         };
         let (Raw { jets: half, .. }, Raw { jets, sure, .. }) = (by(NEIGHBOURS / 2)?, by(NEIGHBOURS)?);
         let of_query = |query: usize| match half.value(query) - jets.value(query) {

@@ -2,9 +2,9 @@
 
 use super::batch::{Batch, Observations};
 use super::kriging::{Krige, Workspace};
-use super::parts::{Found, Parts};
-use super::quantities::{Quantities, Quantity, Sized};
-use super::{Asked, LocalKriging};
+use super::parts::{Parts, RowOffsets};
+use super::quantities::{Quantities, Quantity, ScaledFunctional};
+use super::{BatchedRequest, LocalKriging};
 use crate::error::{NotDefinite, NumericsError, Result};
 use crate::machine::instruction_set::InstructionSet;
 use crate::machine::vector::dot;
@@ -37,7 +37,7 @@ pub(super) struct Room {
     nearest: Vec<Neighbour>,
     sums: Vec<f64>,
     /// Functionals, lane by lane, if the quantities are functionals.
-    functionals: Vec<Sized>,
+    functionals: Vec<ScaledFunctional>,
 }
 
 impl<'a> Fit<'a> {
@@ -45,9 +45,9 @@ impl<'a> Fit<'a> {
         moving: &'a LocalKriging,
         values: &'a [f64],
         queries: &'a Cloud,
-        asked: Asked<'a>,
+        asked: BatchedRequest<'a>,
     ) -> Self {
-        let Asked { request, quantities, n_neighbours, .. } = asked;
+        let BatchedRequest { request, quantities, n_neighbours, .. } = asked;
         let (d, uncertainty) = (queries.dimension(), request.trend.and_then(Trend::uncertainty));
         let observations =
             Observations { system: &moving.system, values, basis: uncertainty.map(|of| of.basis) };
@@ -105,7 +105,9 @@ impl Room {
             }
             self.batch.put(lane, x, &self.nearest, &fit.observations);
             if let Quantities::Functionals { of, .. } = &fit.quantities {
-                let sized = of(query).into_iter().map(|functional| Sized::of(&functional, system.kernel()));
+                let sized = of(query)
+                    .into_iter()
+                    .map(|functional| ScaledFunctional::of(&functional, system.kernel()));
                 let first = self.functionals.len();
                 self.functionals.extend(sized);
                 self.batch.put_functionals(lane, &self.functionals[first..], system.kernel());
@@ -139,7 +141,7 @@ impl Fit<'_> {
         let kernel = self.moving.system.kernel();
         let parts = self.parts;
         room.set.dispatch(Krige { batch: &room.batch, kernel, parts, workspace: &mut room.workspace });
-        let places = Found::of(self.queries.dimension());
+        let places = RowOffsets::of(self.queries.dimension());
         let mut n_thinned = 0;
         let slots = jets.chunks_exact_mut(self.layout.width());
         for (lane, (jet, sure)) in slots.zip(sure.chunks_exact_mut(1 + parts.n_quantities())).enumerate() {
@@ -180,7 +182,7 @@ impl Fit<'_> {
     fn of_mean(&self, query: usize, quantity: Quantity<'_>, sums: &[f64], place: usize) -> f64 {
         let Some(TrendUncertainty { basis, covariance }) = self.uncertainty else { return 0.0 };
         let mut unexplained = quantity.on_mean(basis, self.queries.point(query));
-        let first = Found::of(self.queries.dimension()).of_functions(&self.parts) + place;
+        let first = RowOffsets::of(self.queries.dimension()).of_functions(&self.parts) + place;
         let explained = sums[first..].iter().step_by(1 + self.parts.n_quantities());
         unexplained.iter_mut().zip(explained).for_each(|(h, explained)| *h -= explained);
         let rows = covariance.chunks_exact(unexplained.len());

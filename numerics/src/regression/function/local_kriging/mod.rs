@@ -195,7 +195,7 @@ impl LocalKriging {
         } else {
             Quantities::none()
         };
-        let asked = Asked { set, request, quantities, n_neighbours: self.n_neighbours() };
+        let asked = BatchedRequest { set, request, quantities, n_neighbours: self.n_neighbours() };
         let Raw { jets, mut sure, n_sure, n_dependent } = self.run(values, queries, asked, observer)?;
         let variances = clamped(sure.iter().step_by(n_sure).copied().collect());
         let deviations = request.has_deviations.then(|| {
@@ -223,13 +223,19 @@ impl LocalKriging {
         let quantities = Quantities::functionals(self.system.kernel(), functionals, count, order.degree())?;
         let request = KrigingRequest { order, has_variances: false, has_deviations: false, trend };
         let (set, n_neighbours) = (InstructionSet::best(), self.n_neighbours());
-        let asked = Asked { set, request, quantities, n_neighbours };
+        let asked = BatchedRequest { set, request, quantities, n_neighbours };
         let Raw { jets, sure, n_sure, n_dependent } = self.run(values, queries, asked, observer)?;
         let deviations = sure.chunks_exact(n_sure).flat_map(|sure| &sure[1..]).map(|s| s.abs()).collect();
         Ok(KrigedFunctionals { jets, deviations, n_dependent })
     }
 
-    fn run(&self, values: &[f64], queries: &Cloud, asked: Asked<'_>, observer: &dyn Observer) -> Result<Raw> {
+    fn run(
+        &self,
+        values: &[f64],
+        queries: &Cloud,
+        asked: BatchedRequest<'_>,
+        observer: &dyn Observer,
+    ) -> Result<Raw> {
         let (set, trend) = (asked.set, asked.request.trend);
         let cloud = self.system.cloud();
         cloud.check_same_dimension(queries)?;
@@ -264,7 +270,7 @@ impl LocalKriging {
 }
 
 /// A request to [`LocalKriging::run`], which splits it into batches.
-struct Asked<'a> {
+struct BatchedRequest<'a> {
     set: InstructionSet,
     request: KrigingRequest<'a>,
     quantities: Quantities<'a>,

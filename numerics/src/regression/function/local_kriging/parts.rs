@@ -62,9 +62,9 @@ impl Parts {
         self.n_solved() + 3 + if self.n_functionals > 0 { self.n_derivatives } else { 0 }
     }
 
-    /// Numbers per query in dimension d, laid out as [`Found`] says.
+    /// Numbers per query in dimension d, laid out as [`RowOffsets`] says.
     pub(super) const fn n_numbers(&self, dimension: usize) -> usize {
-        Found::of(dimension).of_functions(self) + self.n_functions * (1 + self.n_quantities())
+        RowOffsets::of(dimension).of_functions(self) + self.n_functions * (1 + self.n_quantities())
     }
 }
 
@@ -75,7 +75,7 @@ impl Parts {
 /// 3. `|L⁻¹c′|²` of each derivative or functional.
 /// 4. Function by function of the mean, with f its values at the points: `L⁻¹f·L⁻¹c`, then `L⁻¹f·L⁻¹c′` of
 ///    each derivative or functional.
-pub(super) struct Found {
+pub(super) struct RowOffsets {
     /// `|L⁻¹c|²`.
     pub explained: usize,
     /// `|K⁻¹c|²`.
@@ -84,7 +84,7 @@ pub(super) struct Found {
     pub n_dependent: usize,
 }
 
-impl Found {
+impl RowOffsets {
     pub(super) const fn of(dimension: usize) -> Self {
         let trace = 1 + dimension + triangle(dimension);
         Self { explained: trace + 1, norm_squared: trace + 2, n_dependent: trace + 3 }

@@ -22,7 +22,7 @@ pub(super) enum Quantities<'a> {
 pub(super) enum Quantity<'a> {
     Value,
     Derivative(&'a Derivative),
-    Functional(&'a Sized),
+    Functional(&'a ScaledFunctional),
 }
 
 /// A first or second derivative of the function.
@@ -36,12 +36,12 @@ pub(super) struct Derivative {
 }
 
 /// A functional divided by its size, so that squares do not overflow.
-pub(super) struct Sized {
+pub(super) struct ScaledFunctional {
     functional: JetFunctional,
     size: f64,
 }
 
-impl Sized {
+impl ScaledFunctional {
     pub(super) fn of(functional: &JetFunctional, kernel: &Kernel) -> Self {
         let size = functional.size(kernel);
         Self { functional: functional.over(size), size }
@@ -113,7 +113,12 @@ impl<'a> Quantities<'a> {
     }
 
     /// Returns quantity number `at` of a lane. `functionals` are those of all lanes, `count` for each.
-    pub(super) fn get<'b>(&'b self, functionals: &'b [Sized], lane: usize, at: usize) -> Quantity<'b> {
+    pub(super) fn get<'b>(
+        &'b self,
+        functionals: &'b [ScaledFunctional],
+        lane: usize,
+        at: usize,
+    ) -> Quantity<'b> {
         match self {
             Self::Derivatives(derivatives) => Quantity::Derivative(&derivatives[at]),
             Self::Functionals { count, .. } => Quantity::Functional(&functionals[lane * count + at]),

@@ -1,6 +1,6 @@
 //! A kernel with which all groups of values agree.
 
-use super::Learned;
+use super::LearnedModel;
 use super::grid::{Cell, Grid, N_FAMILIES};
 use super::search::Search;
 use crate::error::Result;
@@ -18,15 +18,15 @@ pub(super) struct Agreement<'a> {
 }
 
 /// A cell that is decided for.
-pub(super) struct Decided {
-    pub(super) learned: Learned,
+pub(super) struct CellChoice {
+    pub(super) learned: LearnedModel,
     /// `−ln(likelihood · prior on noise)` of all groups, up to a constant of the values.
     pub(super) negative_log: f64,
 }
 
 /// Verdict of all groups and of the deep ones on a cell.
 struct Verdict {
-    decided: Decided,
+    decided: CellChoice,
     /// True if the deep groups have about the same variance as all groups.
     is_of_groups: bool,
     /// True if the values of no place contradict the cell.
@@ -43,7 +43,7 @@ impl Agreement<'_> {
     /// # Errors
     /// `NumericsError::Cancelled`. `NumericsError::WeightsOverflow` for values whose squares exceed
     /// float64.
-    pub(super) fn decided(&mut self, best: [Cell; N_FAMILIES]) -> Result<Option<Decided>> {
+    pub(super) fn decided(&mut self, best: [Cell; N_FAMILIES]) -> Result<Option<CellChoice>> {
         let best = self.best(best)?;
         let mut cell = self.all.shortest(best)?;
         let (mut of_groups, mut last) = (None, None);
@@ -94,7 +94,7 @@ impl Agreement<'_> {
         let Some(deep) = deep else { return Ok(None) };
         let variance = all.variance.max(deep.variance);
         Ok(Some(Verdict {
-            decided: Decided {
+            decided: CellChoice {
                 learned: self.grid.learned(cell, variance, self.unit)?,
                 negative_log: self.all.negative_log_posterior(cell)?,
             },

@@ -5,7 +5,7 @@
 
 use std::collections::HashMap;
 
-use super::Observed;
+use super::ObservedCloud;
 use crate::regression::solver::Autocorrelation;
 
 /// Least number of deviations by which the coefficient of independent residuals is exceeded. Products of
@@ -29,7 +29,7 @@ pub(super) struct Rings([Pairs; RINGS]);
 impl Rings {
     /// Pairs each of these points with its neighbours of the ranks 1, 2d + 1 and 4d + 1, where they are among
     /// them too. `points` are the first points at their positions, by row.
-    pub(super) fn of(observed: &Observed<'_>, points: &[usize]) -> Self {
+    pub(super) fn of(observed: &ObservedCloud<'_>, points: &[usize]) -> Self {
         let row_of: HashMap<usize, usize> =
             points.iter().enumerate().map(|(row, &point)| (point, row)).collect();
         let width = 2 * observed.cloud.dimension();
@@ -103,7 +103,7 @@ mod tests {
         let list: Vec<f64> = cloud.points().map(|x| residual(x[0], random.normal())).collect();
         let sampling = Sampling::of(&cloud, &Unobserved).unwrap();
         let (values, noise, mean) = (&list[..], Noise::Unknown, Mean::Zero);
-        let observed = Observed { cloud: &cloud, sampling: &sampling, values, noise, mean };
+        let observed = ObservedCloud { cloud: &cloud, sampling: &sampling, values, noise, mean };
         let points: Vec<usize> = (0..N).collect();
         Rings::of(&observed, &points).autocorrelation(&list.repeat(n_lists), N, 1.0)
     }

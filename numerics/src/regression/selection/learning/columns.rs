@@ -8,7 +8,7 @@
 //! Points in up to three dimensions with spreads alike are places, where all directions are alike. There,
 //! what is learned does not change when the points are rotated.
 
-use super::agreement::Decided;
+use super::agreement::CellChoice;
 use super::comparison::Comparison;
 use super::values::Values;
 use super::{LEAST_VALUES, Noise, Outcome};
@@ -117,7 +117,7 @@ struct Measure {
 struct Best<'a> {
     values: &'a Values<'a>,
     comparison: Comparison<'a>,
-    decided: Option<Decided>,
+    decided: Option<CellChoice>,
 }
 
 impl Best<'_> {
@@ -196,7 +196,7 @@ impl<'a> Table<'a> {
     ///
     /// # Errors
     /// `NumericsError::Cancelled`.
-    fn scales(&self, from: &Decided, observer: &dyn Observer) -> Result<Option<Vec<f64>>> {
+    fn scales(&self, from: &CellChoice, observer: &dyn Observer) -> Result<Option<Vec<f64>>> {
         let sample = self.sample();
         let units = self.units();
         let cloud = self.values.observed.cloud.select(&sample);
@@ -239,8 +239,8 @@ impl<'a> Table<'a> {
 
     /// Returns kernel and noise of what is best so far, for points in these units and values in theirs.
     /// `None` for a kernel beyond float64.
-    fn start(&self, from: &Decided, sample: &[usize], units: &[f64]) -> Option<Hyperparameters> {
-        let Decided { learned, .. } = from;
+    fn start(&self, from: &CellChoice, sample: &[usize], units: &[f64]) -> Option<Hyperparameters> {
+        let CellChoice { learned, .. } = from;
         let kernel = learned.kernel(1.0).ok()?;
         let of_column = |(column, unit): (usize, &f64)| {
             let length_scale = kernel.length_scales().map_or(kernel.length_scale(), |all| all[column]);

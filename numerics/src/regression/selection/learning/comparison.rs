@@ -1,12 +1,12 @@
 //! A grid of kernels that are compared on values, taken in an order.
 
-use super::agreement::{Agreement, Decided};
+use super::agreement::{Agreement, CellChoice};
 use super::grid::Grid;
 use super::likelihood::Evidence;
 use super::order::Order;
 use super::search::Search;
 use super::values::Values;
-use super::{Learned, Observed};
+use super::{LearnedModel, ObservedCloud};
 use crate::error::Result;
 use crate::kernel::Kernel;
 use crate::observer::Observer;
@@ -43,7 +43,7 @@ impl<'a> Comparison<'a> {
         let factors: Vec<f64> = scales.iter().map(|scale| 1.0 / scale).collect();
         let cloud = values.observed.cloud.stretched(&factors);
         let sampling = Sampling::of(&cloud, observer)?;
-        let stretched = Observed { cloud: &cloud, sampling: &sampling, ..values.observed };
+        let stretched = ObservedCloud { cloud: &cloud, sampling: &sampling, ..values.observed };
         let order = Order::of(&stretched, observer)?;
         let grid = Grid::of_columns(values, scales.to_vec(), sampling.scales().spacing);
         Ok(Self { values, all: Evidence::of(values, &order.searched), order, grid })
@@ -55,7 +55,7 @@ impl<'a> Comparison<'a> {
     /// # Errors
     /// `NumericsError::Cancelled`. `NumericsError::WeightsOverflow` for values whose squares exceed
     /// float64.
-    pub(super) fn decided(&self, observer: &dyn Observer) -> Result<Option<Decided>> {
+    pub(super) fn decided(&self, observer: &dyn Observer) -> Result<Option<CellChoice>> {
         let Self { values, all, order, grid } = self;
         let deep = Evidence::of(values, &order.deep);
         let mut agreement = Agreement {
@@ -78,7 +78,7 @@ impl<'a> Comparison<'a> {
     }
 
     /// Returns the kernel and noise for values that do not decide.
-    pub(super) fn undecided(&self) -> Learned {
+    pub(super) fn undecided(&self) -> LearnedModel {
         self.grid.undecided(self.values)
     }
 
@@ -89,9 +89,9 @@ impl<'a> Comparison<'a> {
     pub(super) fn concluded(
         &self,
         kernel: &Kernel,
-        decided: Learned,
+        decided: LearnedModel,
         observer: &dyn Observer,
-    ) -> Result<Learned> {
+    ) -> Result<LearnedModel> {
         self.all.concluded(kernel, decided, observer)
     }
 }

@@ -1,7 +1,7 @@
 //! A grid of kernels and noises: smoothness, length scale, and the ratio of noise to variance.
 
 use super::values::Values;
-use super::{LEAST_RATIO, Learned, Noise};
+use super::{LEAST_RATIO, LearnedModel, Noise};
 use crate::error::{NumericsError, Result};
 use crate::kernel::{Family, Kernel};
 
@@ -125,7 +125,7 @@ impl Grid {
     }
 
     /// Returns the kernel and noise for values that do not decide.
-    pub(super) fn undecided(&self, values: &Values<'_>) -> Learned {
+    pub(super) fn undecided(&self, values: &Values<'_>) -> LearnedModel {
         let observed = &values.observed;
         let family = FAMILIES[ROUGHEST];
         let ratio = ratio(self.least_ratio);
@@ -139,7 +139,7 @@ impl Grid {
             }
             _ => ratio,
         };
-        Learned {
+        LearnedModel {
             family,
             length_scale: family.length_scale_of_values(observed.sampling.scales()),
             length_scales: None,
@@ -157,14 +157,14 @@ impl Grid {
     /// # Errors
     /// [`NumericsError::WeightsOverflow`] for values whose squares exceed float64, and the errors of the
     /// kernel.
-    pub(super) fn learned(&self, cell: Cell, variance: f64, unit: f64) -> Result<Learned> {
+    pub(super) fn learned(&self, cell: Cell, variance: f64, unit: f64) -> Result<LearnedModel> {
         let ratio = ratio(cell.ratio);
         let variance = self.known_variance(ratio).unwrap_or(in_units(variance, unit));
         if variance > GREATEST_VARIANCE {
             return Err(NumericsError::WeightsOverflow);
         }
         let kernel = self.correlations(cell)?;
-        Ok(Learned {
+        Ok(LearnedModel {
             family: kernel.family(),
             length_scale: kernel.length_scale(),
             length_scales: kernel.length_scales().map(<[f64]>::to_vec),

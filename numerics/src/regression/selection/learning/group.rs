@@ -35,7 +35,7 @@ pub(super) struct Nugget {
 
 /// Functions and values of the responses without what the given values explain: rows of `L⁻¹[F Y]`, L the
 /// Cholesky factor of the group. The unit is the deviation that is left of the process.
-pub(super) struct Whitened {
+pub(super) struct WhitenedGroup {
     /// `[r, p + k]`, column by column.
     pub(super) columns: Vec<f64>,
     /// `ln det` of the covariance of the responses given the others, for a process of variance 1.
@@ -63,7 +63,7 @@ impl Group {
     }
 
     /// Returns the whitened responses. `None` if the matrix is not positive definite in float64.
-    pub(super) fn whitened(&self, kernel: &Kernel, nugget: Nugget) -> Option<Whitened> {
+    pub(super) fn whitened(&self, kernel: &Kernel, nugget: Nugget) -> Option<WhitenedGroup> {
         let (n, given) = (self.cloud.n_points(), self.n_given);
         let mut gram = self.gram(kernel, nugget);
         let mut factor = MatMut::from_column_major_slice_mut(&mut gram, n, n);
@@ -83,7 +83,7 @@ impl Group {
         solve_lower_triangular_in_place(factor.rb(), right, Par::Seq);
         let log_determinant = (given..n).map(|i| factor[(i, i)].ln()).sum::<f64>() * 2.0;
         let columns = columns.chunks_exact(n).flat_map(|column| &column[given..]).copied().collect();
-        Some(Whitened { columns, log_determinant })
+        Some(WhitenedGroup { columns, log_determinant })
     }
 
     /// Returns the lower triangle of the covariances under a kernel of variance 1.

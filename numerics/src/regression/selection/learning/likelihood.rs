@@ -3,9 +3,9 @@
 use faer::Mat;
 use rayon::prelude::*;
 
-use super::Learned;
+use super::LearnedModel;
 use super::autocorrelation::Rings;
-use super::group::{Group, Nugget, Whitened};
+use super::group::{Group, Nugget, WhitenedGroup};
 use super::order::{Conditional, PLACE};
 use super::replicates::Scatter;
 use super::values::Values;
@@ -75,7 +75,7 @@ pub(super) struct Evidence<'a> {
 }
 
 /// Functions and values without what the groups explain of them.
-struct Unexplained {
+struct Residuals {
     /// `[n, p + k]` column by column, group after group.
     columns: Vec<f64>,
     n_rows: usize,
@@ -137,9 +137,9 @@ impl<'a> Evidence<'a> {
     pub(super) fn concluded(
         &self,
         kernel: &Kernel,
-        decided: Learned,
+        decided: LearnedModel,
         observer: &dyn Observer,
-    ) -> Result<Learned> {
+    ) -> Result<LearnedModel> {
         // The least noise does not make the mean worse.
         let nugget = Nugget { ratio: decided.ratio, least: LEAST_RATIO_OF_MEAN };
         match (self.unexplained(kernel, nugget, observer)?, self.values.observed.mean) {
@@ -148,7 +148,7 @@ impl<'a> Evidence<'a> {
             (Some(left), mean) => {
                 let trend = (mean != Mean::Zero).then(|| self.trend(&left)).transpose()?;
                 let disagreement = self.disagreement(left, decided.variance);
-                Ok(Learned { trend, disagreement, ..decided })
+                Ok(LearnedModel { trend, disagreement, ..decided })
             }
         }
     }
@@ -191,7 +191,7 @@ impl<'a> Evidence<'a> {
         })
     }
 
-    fn trend(&self, left: &Unexplained) -> Result<Trend> {
+    fn trend(&self, left: &Residuals) -> Result<Trend> {
         let p = self.n_functions();
         let column = |a: usize| &left.columns[a * left.n_rows..][..left.n_rows];
         let gram = Mat::from_fn(p, p, |a, b| dot(column(a), column(b)));
@@ -209,7 +209,7 @@ impl<'a> Evidence<'a> {
 
     /// Returns how the values contradict a process of this variance. Each is measured by the deviation that
     /// the earlier ones leave it.
-    fn disagreement(&self, mut left: Unexplained, variance: f64) -> Option<Disagreement> {
+    fn disagreement(&self, mut left: Residuals, variance: f64) -> Option<Disagreement> {
         let (n, p) = (left.n_rows, self.n_functions());
         remove_mean(&mut left.columns, n, p)?;
         let rest = &left.columns[p * n..];
@@ -234,13 +234,13 @@ impl<'a> Evidence<'a> {
         kernel: &Kernel,
         nugget: Nugget,
         observer: &dyn Observer,
-    ) -> Result<Option<Unexplained>> {
+    ) -> Result<Option<Residuals>> {
         let whitened = |group: &Group| {
             observer.checkpoint()?;
             Ok(group.whitened(kernel, nugget))
         };
-        let whitened: Result<Vec<Option<Whitened>>> = self.groups.par_iter().map(whitened).collect();
-        let Some(whitened) = whitened?.into_iter().collect::<Option<Vec<Whitened>>>() else {
+        let whitened: Result<Vec<Option<WhitenedGroup>>> = self.groups.par_iter().map(whitened).collect();
+        let Some(whitened) = whitened?.into_iter().collect::<Option<Vec<WhitenedGroup>>>() else {
             return Ok(None);
         };
         let n_columns = self.n_functions() + self.values.n_lists();
@@ -253,6 +253,6 @@ impl<'a> Evidence<'a> {
             }
         }
         let log_determinant = whitened.iter().map(|group| group.log_determinant).sum();
-        Ok(Some(Unexplained { columns, n_rows, log_determinant }))
+        Ok(Some(Residuals { columns, n_rows, log_determinant }))
     }
 }

@@ -33,7 +33,7 @@ use crate::points::duplicates::RowCopy;
 use crate::points::sampling::Sampling;
 use crate::regression::solver::Disagreement;
 use crate::regression::solver::trend::{Mean, Trend};
-use agreement::Decided;
+use agreement::CellChoice;
 use comparison::Comparison;
 use grid::is_least_variance;
 use values::Values;
@@ -57,7 +57,7 @@ pub enum Noise<'a> {
 
 /// Values at the points of a cloud, with what is known of noise and mean.
 #[derive(Clone, Copy)]
-pub struct Observed<'a> {
+pub struct ObservedCloud<'a> {
     pub cloud: &'a Cloud,
     pub sampling: &'a Sampling,
     /// Values `[n]`, unit V. Or `[k, n]`: k lists with a common kernel and noise.
@@ -66,7 +66,7 @@ pub struct Observed<'a> {
     pub mean: Mean,
 }
 
-impl Observed<'_> {
+impl ObservedCloud<'_> {
     /// Checks that the values are one or more complete lists.
     ///
     /// # Errors
@@ -83,7 +83,7 @@ impl Observed<'_> {
 
 /// Kernel, noise and mean that were learned from values.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Learned {
+pub struct LearnedModel {
     pub family: Family,
     /// ℓ, unit L. The shortest one, if each column has its own.
     pub length_scale: f64,
@@ -103,7 +103,7 @@ pub struct Learned {
     pub disagreement: Option<Disagreement>,
 }
 
-impl Learned {
+impl LearnedModel {
     /// Returns the kernel with some variance, unit V².
     ///
     /// # Errors
@@ -156,7 +156,7 @@ const LEAST_VALUES: usize = 8;
 /// # Errors
 /// `NumericsError::Cancelled`, `NumericsError::LengthMismatch`, `NumericsError::MeanNotDetermined`.
 /// `NumericsError::WeightsOverflow` for values whose squares exceed float64.
-pub fn learn(observed: Observed<'_>, observer: &dyn Observer) -> Result<Learned> {
+pub fn learn(observed: ObservedCloud<'_>, observer: &dyn Observer) -> Result<LearnedModel> {
     let learn = if is_table(observed.cloud) { columns::decided } else { columns::decided_alike };
     learn_by(observed, learn, observer)
 }
@@ -165,18 +165,18 @@ pub fn learn(observed: Observed<'_>, observer: &dyn Observer) -> Result<Learned>
 ///
 /// # Errors
 /// Returns the errors of [`learn`].
-pub fn learn_alike(observed: Observed<'_>, observer: &dyn Observer) -> Result<Learned> {
+pub fn learn_alike(observed: ObservedCloud<'_>, observer: &dyn Observer) -> Result<LearnedModel> {
     learn_by(observed, columns::decided_alike, observer)
 }
 
 /// A comparison of kernels and what it decided, if the values decide anything.
-type Outcome<'a> = (Comparison<'a>, Option<Decided>);
+type Outcome<'a> = (Comparison<'a>, Option<CellChoice>);
 
 fn learn_by(
-    observed: Observed<'_>,
+    observed: ObservedCloud<'_>,
     decide: for<'a> fn(&'a Values<'a>, &dyn Observer) -> Result<Outcome<'a>>,
     observer: &dyn Observer,
-) -> Result<Learned> {
+) -> Result<LearnedModel> {
     observed.check()?;
     let values = Values::of(observed);
     let n_positions = observed.sampling.neighbours().n_positions();
@@ -187,14 +187,18 @@ fn learn_by(
     };
     let learned = decided.map_or_else(|| comparison.undecided(), |decided| decided.learned);
     let kernel = learned.kernel(1.0)?;
-    comparison.concluded(&kernel, Learned { copies: values.copies(), ..learned }, observer)
+    comparison.concluded(&kernel, LearnedModel { copies: values.copies(), ..learned }, observer)
 }
 
 /// Finds the mean of values under a given kernel and noise.
 ///
 /// # Errors
 /// `NumericsError::Cancelled`, `NumericsError::LengthMismatch`, `NumericsError::MeanNotDetermined`.
-pub fn learn_mean(observed: Observed<'_>, kernel: &Kernel, observer: &dyn Observer) -> Result<Learned> {
+pub fn learn_mean(
+    observed: ObservedCloud<'_>,
+    kernel: &Kernel,
+    observer: &dyn Observer,
+) -> Result<LearnedModel> {
     observed.check()?;
     let variance = kernel.variance();
     let ratio = match observed.noise {
@@ -203,7 +207,7 @@ pub fn learn_mean(observed: Observed<'_>, kernel: &Kernel, observer: &dyn Observ
         Noise::PerPoint(all) => all.iter().sum::<f64>() / all.len() as f64 / variance,
     };
     let values = Values::of(observed);
-    let given = Learned {
+    let given = LearnedModel {
         family: kernel.family(),
         length_scale: kernel.length_scale(),
         length_scales: kernel.length_scales().map(<[f64]>::to_vec),

@@ -9,7 +9,7 @@
 //! likelihood of all values, but their bands covered less. Smooth kernels then won more often where a field
 //! has a kink.
 
-use super::Observed;
+use super::ObservedCloud;
 use crate::error::Result;
 use crate::observer::Observer;
 use crate::points::cells::{Cells, mean};
@@ -73,7 +73,7 @@ impl Order {
     ///
     /// # Errors
     /// `NumericsError::Cancelled`.
-    pub(super) fn of(observed: &Observed<'_>, observer: &dyn Observer) -> Result<Self> {
+    pub(super) fn of(observed: &ObservedCloud<'_>, observer: &dyn Observer) -> Result<Self> {
         let cloud = observed.cloud;
         if observed.sampling.neighbours().n_positions() <= MAX_TOGETHER {
             let halves = halves(observed, &[]);
@@ -109,7 +109,7 @@ impl Order {
 ///
 /// # Errors
 /// `NumericsError::Cancelled`.
-fn sample(observed: &Observed<'_>, observer: &dyn Observer) -> Result<Vec<usize>> {
+fn sample(observed: &ObservedCloud<'_>, observer: &dyn Observer) -> Result<Vec<usize>> {
     let cloud = observed.cloud;
     let centres = thinned_points(cloud, MAX_SAMPLE / TOGETHER, observer)?;
     let around = |&point: &usize| {
@@ -124,7 +124,7 @@ fn sample(observed: &Observed<'_>, observer: &dyn Observer) -> Result<Vec<usize>
 
 /// Splits the points outside of the sample into two halves, each spread over the cloud. Of every two near
 /// points, each half has one.
-fn halves(observed: &Observed<'_>, sample: &[usize]) -> [Vec<u32>; 2] {
+fn halves(observed: &ObservedCloud<'_>, sample: &[usize]) -> [Vec<u32>; 2] {
     let neighbours = observed.sampling.neighbours();
     let mut is_left = vec![false; observed.cloud.n_points()];
     for position in 0..neighbours.n_positions() {
@@ -147,7 +147,7 @@ fn by_places(cloud: &Cloud, points: &[u32]) -> Vec<usize> {
 }
 
 /// Returns the point of a cell whose neighbours are farthest away, the first of equals.
-fn lonelier(observed: &Observed<'_>, cell: &[u32]) -> Option<u32> {
+fn lonelier(observed: &ObservedCloud<'_>, cell: &[u32]) -> Option<u32> {
     let spacing = |point: u32| observed.sampling.spacing(point as usize);
     cell.iter().copied().max_by(|&a, &b| spacing(a).total_cmp(&spacing(b)).then(b.cmp(&a)))
 }
@@ -167,7 +167,7 @@ mod tests {
             let (cloud, values) = (fibonacci_sphere(n), vec![0.0; n]);
             let sampling = Sampling::of(&cloud, &Unobserved).unwrap();
             let (noise, mean) = (Noise::Unknown, Mean::Zero);
-            let observed = Observed { cloud: &cloud, sampling: &sampling, values: &values, noise, mean };
+            let observed = ObservedCloud { cloud: &cloud, sampling: &sampling, values: &values, noise, mean };
             let order = Order::of(&observed, &Unobserved).unwrap();
             let mut is_explained = vec![false; n];
             for group in &order.searched {

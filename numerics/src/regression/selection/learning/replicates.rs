@@ -8,7 +8,7 @@
 
 use std::cmp::Ordering;
 
-use super::{LEAST_RATIO, Observed};
+use super::{LEAST_RATIO, ObservedCloud};
 use crate::points::duplicates::RowCopy;
 
 /// The rows at all positions that have several.
@@ -58,7 +58,7 @@ pub(super) struct Rows<'a, N> {
 }
 
 impl Replicates {
-    pub(super) fn of<N: Fn(usize) -> f64>(observed: &Observed<'_>, rows: &Rows<'_, N>) -> Self {
+    pub(super) fn of<N: Fn(usize) -> f64>(observed: &ObservedCloud<'_>, rows: &Rows<'_, N>) -> Self {
         let neighbours = observed.sampling.neighbours();
         let at = (0..neighbours.n_positions()).map(|position| neighbours.points_at(position));
         let several = at.filter(|points| points.len() > 1);

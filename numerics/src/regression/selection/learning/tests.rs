@@ -12,9 +12,9 @@ fn field(n: usize, noise: f64) -> (Cloud, Vec<f64>) {
     (cloud.clone(), values.collect())
 }
 
-fn learned(cloud: &Cloud, values: &[f64], noise: Noise<'_>) -> Learned {
+fn learned(cloud: &Cloud, values: &[f64], noise: Noise<'_>) -> LearnedModel {
     let sampling = Sampling::of(cloud, &Unobserved).unwrap();
-    let observed = Observed { cloud, sampling: &sampling, values, noise, mean: Mean::Constant };
+    let observed = ObservedCloud { cloud, sampling: &sampling, values, noise, mean: Mean::Constant };
     learn(observed, &Unobserved).unwrap()
 }
 
@@ -128,7 +128,7 @@ fn points_that_coincide_have_a_mean_though_some_have_no_noise() {
         let noise: Vec<f64> = (0..2 * n).map(|i| if i % 3 == 0 { 0.0 } else { 1e-4 }).collect();
         let sampling = Sampling::of(&cloud, &Unobserved).unwrap();
         let (mean, noise) = (Mean::Constant, Noise::PerPoint(&noise));
-        let observed = Observed { cloud: &cloud, sampling: &sampling, values: &values, noise, mean };
+        let observed = ObservedCloud { cloud: &cloud, sampling: &sampling, values: &values, noise, mean };
         let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
         assert!(learn_mean(observed, &kernel, &Unobserved).unwrap().trend.is_some(), "{n}");
         assert!(learn(observed, &Unobserved).unwrap().trend.is_some(), "{n}");

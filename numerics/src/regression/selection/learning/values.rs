@@ -1,7 +1,7 @@
 //! Values on which kernels are compared.
 
 use super::replicates::{Replicate, Replicates, Rows, Scatter};
-use super::{Noise, Observed};
+use super::{Noise, ObservedCloud};
 use crate::points::duplicates::RowCopy;
 use crate::regression::solver::trend::Basis;
 
@@ -11,7 +11,7 @@ pub(super) const MAX_LISTS: usize = 16;
 
 /// Lists of values without their averages, in units of the greatest value that is left.
 pub(super) struct Values<'a> {
-    pub(super) observed: Observed<'a>,
+    pub(super) observed: ObservedCloud<'a>,
     lists: Vec<&'a [f64]>,
     /// Average of each list, `[k]`, unit V. 0 if the process has no mean.
     shared: Vec<f64>,
@@ -27,7 +27,7 @@ pub(super) struct Values<'a> {
 }
 
 impl<'a> Values<'a> {
-    pub(super) fn of(observed: Observed<'a>) -> Self {
+    pub(super) fn of(observed: ObservedCloud<'a>) -> Self {
         let n = observed.cloud.n_points();
         let basis = Basis::of(observed.mean, observed.cloud);
         let lists = observed.values.chunks_exact(n);

@@ -11,7 +11,7 @@ use std::cell::RefCell;
 
 use slsqp::{Func, StopTols, minimize};
 
-use super::walk::{Found, Walk, free_slopes, near};
+use super::walk::{DescentEnd, Walk, free_slopes, near};
 use crate::error::Result;
 use crate::observer::Observer;
 use crate::regression::selection::evaluation::Evaluator;
@@ -47,7 +47,7 @@ pub(super) fn descend(
     start: &[f64],
     max_evaluations: usize,
     observer: &dyn Observer,
-) -> Result<(Option<Found>, usize)> {
+) -> Result<(Option<DescentEnd>, usize)> {
     let mut walk = Walk::new(evaluator, space, observer);
     if walk.merit(start)?.is_none() {
         return Ok((None, walk.evaluations));
@@ -70,10 +70,10 @@ pub(super) fn descend(
 pub(super) fn finish(
     evaluator: &mut Evaluator<'_>,
     space: &Space,
-    from: Found,
+    from: DescentEnd,
     max_evaluations: usize,
     observer: &dyn Observer,
-) -> Result<(Found, usize)> {
+) -> Result<(DescentEnd, usize)> {
     let (bounds, start) = (space.bounds(), from.logarithms.clone());
     let mut walk = Walk::new(evaluator, space, observer);
     let mut merit = walk.merit(&start)?.unwrap_or(f64::NEG_INFINITY);

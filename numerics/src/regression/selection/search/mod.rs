@@ -17,9 +17,9 @@ use crate::regression::selection::subject::{Observations, Subject};
 use crate::regression::solver::trend::Trend;
 pub use descent::Side;
 use descent::{finish, side};
-use starts::{Ascended, Starts, ascended};
 pub(super) use starts::{MAX_FROM_EVERY_START, SAMPLE};
-use walk::Found;
+use starts::{SpaceResult, Starts, ascended};
+use walk::DescentEnd;
 
 /// Usual limit of evaluations of one descent.
 pub const MAX_EVALUATIONS: usize = 200;
@@ -54,7 +54,7 @@ pub struct Selection<'a> {
 
 /// The best hyperparameters that a search found.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Selected {
+pub struct SearchResult {
     pub hyperparameters: Hyperparameters,
     /// Score of the criterion. Greater is better.
     pub score: f64,
@@ -84,7 +84,7 @@ pub struct Selected {
 /// [`NumericsError::MeanNotDetermined`], for leave-one-out also if the mean is not determined without one of
 /// the points. [`NumericsError::NotPositiveDefinite`] if the matrix is not positive definite at any start.
 /// [`NumericsError::Cancelled`], and the errors of [`Hyperparameters::kernel_on`].
-pub fn select(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Selected> {
+pub fn select(selection: &Selection<'_>, observer: &dyn Observer) -> Result<SearchResult> {
     observer.enter(Stage::Factor);
     search(selection, observer)
 }
@@ -93,7 +93,7 @@ pub fn select(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Sele
 ///
 /// # Errors
 /// Returns the errors of [`select`].
-pub(super) fn search(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Selected> {
+pub(super) fn search(selection: &Selection<'_>, observer: &dyn Observer) -> Result<SearchResult> {
     let Selection { observations, vary, start, .. } = *selection;
     let (subject, cloud) = (Subject::of(observations)?, observations.cloud);
     start.noise.check_matches(cloud)?;
@@ -168,13 +168,13 @@ fn best_of(
     subject: &Subject<'_>,
     selection: &Selection<'_>,
     spaces: &[Space],
-    ascended: Vec<Ascended>,
+    ascended: Vec<SpaceResult>,
     observer: &dyn Observer,
-) -> Result<Selected> {
+) -> Result<SearchResult> {
     let mut evaluations: usize = ascended.iter().map(|ascended| ascended.evaluations).sum();
     let mut scores = vec![None; spaces.len()];
-    let mut best: Option<(usize, Found, usize)> = None;
-    for (family, Ascended { best: found, used, .. }) in ascended.into_iter().enumerate() {
+    let mut best: Option<(usize, DescentEnd, usize)> = None;
+    for (family, SpaceResult { best: found, used, .. }) in ascended.into_iter().enumerate() {
         let Some(found) = found else { continue };
         scores[family] = Some(found.score);
         if best.as_ref().is_none_or(|(_, best, _)| best.merit < found.merit) {
@@ -192,7 +192,7 @@ fn best_of(
     evaluations += used_to_finish;
     scores[family] = Some(found.score);
     let sides = found.logarithms.iter().zip(space.bounds()).map(|(&x, (min, max))| side(x, min, max));
-    Ok(Selected {
+    Ok(SearchResult {
         free: space.parameters().zip(sides).collect(),
         hyperparameters: found.hyperparameters,
         score: found.score,

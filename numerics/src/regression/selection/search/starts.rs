@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 
 use super::descent::descend;
-use super::walk::{Found, Walk};
+use super::walk::{DescentEnd, Walk};
 use super::{MAX_SIDE_BY_SIDE_POINTS, Selection};
 use crate::error::{NumericsError, Result};
 use crate::machine::random::mixed;
@@ -27,8 +27,8 @@ pub(super) struct Starts<'a> {
 }
 
 /// The best end of the descents of a space, the evaluations of the descent that led there, and of all.
-pub(super) struct Ascended {
-    pub(super) best: Option<Found>,
+pub(super) struct SpaceResult {
+    pub(super) best: Option<DescentEnd>,
     pub(super) used: usize,
     pub(super) evaluations: usize,
 }
@@ -42,7 +42,7 @@ pub(super) fn ascended(
     selection: &Selection<'_>,
     starts: &[Starts<'_>],
     observer: &dyn Observer,
-) -> Result<Vec<Ascended>> {
+) -> Result<Vec<SpaceResult>> {
     let has_several = starts.iter().any(|starts| starts.at.len() > 1);
     if has_several && subject.n_points() > MAX_FROM_EVERY_START {
         return by_sample(subject, selection, starts, observer);
@@ -50,7 +50,7 @@ pub(super) fn ascended(
     let descents = on_all(subject, selection, starts, observer)?;
     let mut descents = descents.into_iter();
     let of_space = |starts: &Starts<'_>| {
-        let mut ascended = Ascended { best: None, used: 0, evaluations: 0 };
+        let mut ascended = SpaceResult { best: None, used: 0, evaluations: 0 };
         for (found, used) in descents.by_ref().take(starts.at.len()) {
             ascended.evaluations += used;
             let Some(found) = found else { continue };
@@ -69,7 +69,7 @@ fn on_all(
     selection: &Selection<'_>,
     starts: &[Starts<'_>],
     observer: &dyn Observer,
-) -> Result<Vec<(Option<Found>, usize)>> {
+) -> Result<Vec<(Option<DescentEnd>, usize)>> {
     let jobs: Vec<(&Space, &[f64])> =
         starts.iter().flat_map(|starts| starts.at.iter().map(|at| (starts.space, &at[..]))).collect();
     let side_by_side = jobs.len() > 1 && subject.n_points() <= MAX_SIDE_BY_SIDE_POINTS;
@@ -92,7 +92,7 @@ fn by_sample(
     selection: &Selection<'_>,
     starts: &[Starts<'_>],
     observer: &dyn Observer,
-) -> Result<Vec<Ascended>> {
+) -> Result<Vec<SpaceResult>> {
     let ends = ends_on_sample(selection, starts, observer)?;
     let mut evaluator = Evaluator::new(subject, selection.criterion, false);
     let mut all = Vec::with_capacity(starts.len());
@@ -103,7 +103,7 @@ fn by_sample(
             Some(at) => descend(&mut evaluator, starts.space, &at, selection.max_evaluations, observer)?,
             None => (None, 0),
         };
-        all.push(Ascended { best, used, evaluations: n_on_sample + n_compared + used });
+        all.push(SpaceResult { best, used, evaluations: n_on_sample + n_compared + used });
     }
     Ok(all)
 }

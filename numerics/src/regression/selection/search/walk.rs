@@ -15,7 +15,7 @@ const AT_BOUND: f64 = 1e-9;
 
 /// The end of a descent.
 #[derive(Debug, Clone)]
-pub(super) struct Found {
+pub(super) struct DescentEnd {
     pub(super) logarithms: Vec<f64>,
     pub(super) hyperparameters: Hyperparameters,
     pub(super) score: f64,
@@ -147,7 +147,7 @@ impl<'a, 'b> Walk<'a, 'b> {
     }
 
     /// Returns the best point within these bounds, or `None` if there is none. Leaves the evaluator there.
-    pub(super) fn end(mut self, start: &[f64], bounds: &[(f64, f64)]) -> Result<Option<Found>> {
+    pub(super) fn end(mut self, start: &[f64], bounds: &[(f64, f64)]) -> Result<Option<DescentEnd>> {
         let logarithms = self.best_logarithms(start);
         let slopes = self.slopes(&logarithms)?;
         let merit = self.merit(&logarithms)?.unwrap_or(f64::NEG_INFINITY);
@@ -156,7 +156,7 @@ impl<'a, 'b> Walk<'a, 'b> {
         };
         let (score, gradient) = (state.score, gradient.unwrap_or_default());
         let converged = free_slopes(&logarithms, &slopes, bounds).all(|slope| slope.abs() <= FLAT);
-        Ok(Some(Found { logarithms, hyperparameters, score, merit, gradient, converged }))
+        Ok(Some(DescentEnd { logarithms, hyperparameters, score, merit, gradient, converged }))
     }
 }
 

@@ -10,7 +10,7 @@ use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_uppe
 use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
-use super::packed::Packed;
+use super::packed::PackedMatrix;
 use super::substitution::{solve_backward, solve_forward};
 use crate::error::{NumericsError, Result};
 use crate::kernel::Kernel;
@@ -35,13 +35,13 @@ const LEAST_PIECE: usize = 128;
 
 /// The matrix `K + αI`, and after [`Cholesky::factorize`] its factor L.
 pub(in crate::regression::solver) struct Cholesky {
-    packed: Packed,
+    packed: PackedMatrix,
 }
 
 impl Cholesky {
     /// Returns how many numbers n points take. `None` if the count overflows.
     pub(in crate::regression::solver) fn n_numbers_needed(n: usize) -> Option<usize> {
-        Packed::n_numbers(n)
+        PackedMatrix::n_numbers(n)
     }
 
     /// Assembles `K + αI` without factorizing it.
@@ -55,7 +55,7 @@ impl Cholesky {
         regularization: &Regularization,
         observer: &dyn Observer,
     ) -> Result<Self> {
-        Ok(Self { packed: Packed::gram(spare, cloud, kernel, regularization, observer)? })
+        Ok(Self { packed: PackedMatrix::gram(spare, cloud, kernel, regularization, observer)? })
     }
 
     /// Allocates memory for the factor of n points, to be filled with it.
@@ -63,7 +63,7 @@ impl Cholesky {
     /// # Errors
     /// [`NumericsError::OutOfMemory`].
     pub(in crate::regression::solver) fn blank(spare: &Arc<SpareBuffer>, n: usize) -> Result<Self> {
-        Ok(Self { packed: Packed::blank(spare, n)? })
+        Ok(Self { packed: PackedMatrix::blank(spare, n)? })
     }
 
     /// Returns all numbers in the order of memory.
@@ -173,7 +173,7 @@ enum Stop {
 
 /// Factorizes the first triangle, solves for the square below it, updates the second triangle, and factorizes
 /// that.
-fn factorize_packed(a: &mut Packed, floor: f64, observer: &dyn Observer) -> Result<(), Stop> {
+fn factorize_packed(a: &mut PackedMatrix, floor: f64, observer: &dyn Observer) -> Result<(), Stop> {
     let mut leaf = Leaf::new(a.n_points());
     let mut parts = a.parts_mut();
     let n_first = parts.first().nrows();

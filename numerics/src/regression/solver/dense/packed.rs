@@ -38,7 +38,7 @@ const COLUMNS_PER_TASK: usize = 8;
 const NORM_TASKS: usize = 32;
 
 /// A symmetric matrix A, or the lower triangle L of its factor, in rectangular full packed storage.
-pub(super) struct Packed {
+pub(super) struct PackedMatrix {
     buffer: Buffer,
     n: usize,
 }
@@ -71,7 +71,7 @@ struct Run {
     at: usize,
 }
 
-impl Packed {
+impl PackedMatrix {
     /// Returns the number of columns of the rectangle, which is the number of points of the first triangle.
     pub(super) fn n_columns(n: usize) -> usize {
         n.div_ceil(2)
@@ -178,12 +178,12 @@ impl Packed {
         MatRef::from_column_major_slice_with_stride(&self.buffer, n_second, n_second, self.stride())
     }
 
-    /// Returns the columns of [`Packed::first`].
+    /// Returns the columns of [`PackedMatrix::first`].
     pub(super) fn columns_of_first(&self) -> Columns<'_> {
         Columns::new(&self.buffer[GAP..], self.stride())
     }
 
-    /// Returns the columns of [`Packed::second_transposed`].
+    /// Returns the columns of [`PackedMatrix::second_transposed`].
     pub(super) fn columns_of_second(&self) -> Columns<'_> {
         Columns::new(&self.buffer, self.stride())
     }
@@ -241,13 +241,13 @@ fn add_absolute_values(sums: &mut [f64], runs: impl Iterator<Item = Run>, column
 /// Yields the runs of a column of the rectangle: that of the second triangle, if any, then that of the first
 /// one with the square.
 fn runs(n: usize, c: usize) -> impl Iterator<Item = Run> {
-    let h = Packed::n_columns(n);
+    let h = PackedMatrix::n_columns(n);
     let second = (h + c < n).then(|| Run { point: h + c, points: h..h + c + 1, at: 0 });
     let first = Run { point: c, points: c..n, at: c + GAP };
     second.into_iter().chain([first])
 }
 
-/// Writable views of the parts of a [`Packed`] matrix.
+/// Writable views of the parts of a [`PackedMatrix`].
 pub(super) struct Parts<'a> {
     triangles: MatMut<'a, f64>,
     pub square: MatMut<'a, f64>,
@@ -294,8 +294,8 @@ mod tests {
             let kernel = Kernel::new(Family::Gauss, 0.7, 2.0).unwrap();
             let alpha = Regularization::per_point((0..n).map(|i| i as f64).collect()).unwrap();
             let spare = SpareBuffer::up_to(0);
-            let packed = Packed::gram(&spare, &cloud, &kernel, &alpha, &Unobserved).unwrap();
-            let (h, first, second) = (Packed::n_columns(n), packed.first(), packed.second_transposed());
+            let packed = PackedMatrix::gram(&spare, &cloud, &kernel, &alpha, &Unobserved).unwrap();
+            let (h, first, second) = (PackedMatrix::n_columns(n), packed.first(), packed.second_transposed());
             let mut largest_sum: f64 = 0.0;
             for i in 0..n {
                 let mut sum = 0.0;
@@ -318,8 +318,10 @@ mod tests {
     #[test]
     fn it_takes_half_the_memory_of_the_whole() {
         for n in [100, 1000, 4000, 20_000] {
-            assert!((Packed::n_numbers(n).unwrap() as f64) < 0.5 * (n * n) as f64 * (1.0 + 20.0 / n as f64));
+            assert!(
+                (PackedMatrix::n_numbers(n).unwrap() as f64) < 0.5 * (n * n) as f64 * (1.0 + 20.0 / n as f64)
+            );
         }
-        assert_eq!(Packed::n_numbers(usize::MAX / 4), None);
+        assert_eq!(PackedMatrix::n_numbers(usize::MAX / 4), None);
     }
 }

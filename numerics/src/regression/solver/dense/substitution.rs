@@ -10,7 +10,7 @@ use std::ops::Range;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::packed::{Columns, Packed};
+use super::packed::{Columns, PackedMatrix};
 
 /// Columns of a panel. Its diagonal block fits the L2 cache and is solved by one thread while the others
 /// wait.
@@ -24,8 +24,8 @@ const GROUP: usize = 8;
 const NUMBERS_PER_TASK: usize = 1 << 16;
 
 /// `x ← L⁻¹x`.
-pub(super) fn solve_forward(l: &Packed, x: &mut [f64]) {
-    let n_first = Packed::n_columns(l.n_points());
+pub(super) fn solve_forward(l: &PackedMatrix, x: &mut [f64]) {
+    let n_first = PackedMatrix::n_columns(l.n_points());
     let arch = Arch::new();
     let first = l.columns_of_first();
     for panel in panels(n_first) {
@@ -49,8 +49,8 @@ pub(super) fn solve_forward(l: &Packed, x: &mut [f64]) {
 }
 
 /// `x ← L⁻ᵀx`.
-pub(super) fn solve_backward(l: &Packed, x: &mut [f64]) {
-    let n_first = Packed::n_columns(l.n_points());
+pub(super) fn solve_backward(l: &PackedMatrix, x: &mut [f64]) {
+    let n_first = PackedMatrix::n_columns(l.n_points());
     let arch = Arch::new();
     let second = l.columns_of_second();
     for panel in panels(x.len() - n_first).rev() {
@@ -264,10 +264,11 @@ mod tests {
     use crate::testing::fibonacci_sphere;
 
     /// A triangle with a dominant diagonal: that of a Gram matrix, not of its factor.
-    fn triangle(n: usize) -> Packed {
+    fn triangle(n: usize) -> PackedMatrix {
         let kernel = Kernel::new(Family::Gauss, 0.3, 1.0).unwrap();
         let alpha = Regularization::uniform(0.2 * n as f64 + 1.0).unwrap();
-        Packed::gram(&SpareBuffer::up_to(0), &fibonacci_sphere(n), &kernel, &alpha, &Unobserved).unwrap()
+        PackedMatrix::gram(&SpareBuffer::up_to(0), &fibonacci_sphere(n), &kernel, &alpha, &Unobserved)
+            .unwrap()
     }
 
     #[test]
@@ -275,7 +276,7 @@ mod tests {
         // Sizes around panels, groups, registers and tasks of both halves.
         for n in [1, 2, 7, 16, 17, 255, 256, 257, 273, 600, 1402, 2581] {
             let l = triangle(n);
-            let (h, first, second) = (Packed::n_columns(n), l.first(), l.second_transposed());
+            let (h, first, second) = (PackedMatrix::n_columns(n), l.first(), l.second_transposed());
             let expected: Vec<f64> = (0..n).map(|i| (0.9 * i as f64).cos()).collect();
             let (mut forward, mut backward) = (vec![0.0; n], vec![0.0; n]);
             for j in 0..n {

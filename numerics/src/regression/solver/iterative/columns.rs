@@ -16,7 +16,7 @@ use crate::regression::sums::side_by_side::SideBySide;
 pub(super) const MOST: usize = GIVEN + 1;
 
 /// The system in the order of its factor. Its kernel has variance 1.
-pub(super) struct Ordered<'a> {
+pub(super) struct OrderedSystem<'a> {
     pub system: &'a System,
     pub order: &'a Order,
     pub kernel: Kernel,
@@ -43,7 +43,7 @@ impl Room {
 
     /// Computes the columns of places that are given equally many points, at most one for each lane, into
     /// `columns`, `[places, MOST]`: entries at the points that each is given, in their order, then its own.
-    pub(super) fn columns_at(&mut self, of: &Ordered<'_>, first: usize, columns: &mut [f32]) {
+    pub(super) fn columns_at(&mut self, of: &OrderedSystem<'_>, first: usize, columns: &mut [f32]) {
         let (lanes, dimension) = (self.set.n_lanes(), of.system.cloud().dimension());
         let (n_columns, count) = (columns.len() / MOST, Order::count(first) + 1);
         let n_places = count.next_multiple_of(COLUMNS);
@@ -68,7 +68,7 @@ impl Room {
     }
 
     /// Writes the points of a place into a lane, as differences from its own.
-    fn put(&mut self, of: &Ordered<'_>, place: usize, lane: usize) {
+    fn put(&mut self, of: &OrderedSystem<'_>, place: usize, lane: usize) {
         let (cloud, noise) = (of.system.cloud(), of.system.regularization());
         let (lanes, dimension, count) = (self.set.n_lanes(), cloud.dimension(), Order::count(place));
         let n_places = (count + 1).next_multiple_of(COLUMNS);

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::columns::{MOST, Ordered, Room};
+use super::columns::{MOST, OrderedSystem, Room};
 use super::order::{GIVEN, Order};
 use crate::error::Result;
 use crate::machine::heap::vec_bytes;
@@ -30,7 +30,8 @@ impl InverseFactor {
         let order = Order::of(system, observer)?;
         let n = system.n_points();
         let mut columns = vec![0.0_f32; n * MOST];
-        let ordered = Ordered { system, order: &order, kernel: system.kernel().clone().of_variance_one() };
+        let ordered =
+            OrderedSystem { system, order: &order, kernel: system.kernel().clone().of_variance_one() };
         let set = InstructionSet::best();
         let room = || Room::new(set, system.cloud().dimension());
         let (few, many) = columns.split_at_mut(n.min(GIVEN) * MOST);

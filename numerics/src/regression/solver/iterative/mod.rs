@@ -24,7 +24,7 @@ use std::sync::Arc;
 use faer::MatMut;
 use rayon::prelude::*;
 
-use super::conjugate_gradients::{Goal, Iterated, Preconditioned, SAFETY, conjugate_gradients};
+use super::conjugate_gradients::{ColumnSolution, Goal, Preconditioned, SAFETY, conjugate_gradients};
 use super::system::System;
 use crate::error::{NumericsError, Result};
 use crate::observer::{Observer, Stage};
@@ -70,13 +70,13 @@ impl Iterative {
     ///
     /// # Errors
     /// [`NumericsError::NotConverged`], [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
-    fn solve(&self, right: &[f64], observer: &dyn Observer) -> Result<Vec<Iterated>> {
+    fn solve(&self, right: &[f64], observer: &dyn Observer) -> Result<Vec<ColumnSolution>> {
         let blocks = right.chunks(SOLVED_AT_ONCE * self.n_points());
         let goal = Goal { tolerance: SAFETY * self.tolerance, slack: LITTLE_SLACK };
         let solve = |block| conjugate_gradients(self, block, goal, observer);
         let found = blocks.map(solve).collect::<Result<Vec<_>>>()?.into_iter().flatten().collect::<Vec<_>>();
         // NaN is no convergence.
-        let is_met = |column: &Iterated| column.relative_residual <= self.tolerance;
+        let is_met = |column: &ColumnSolution| column.relative_residual <= self.tolerance;
         match found.iter().find(|column| !is_met(column)) {
             Some(column) => Err(self.not_converged(column.relative_residual)),
             None => Ok(found),

@@ -6,7 +6,7 @@ use crate::machine::vector::norm;
 use crate::observer::Unobserved;
 use crate::points::cloud::Cloud;
 use crate::regression::solver::trend::Mean;
-use crate::regression::solver::{Solution, Solver, Sought};
+use crate::regression::solver::{RightHandSide, Solution, Solver};
 use crate::regression::sums::regularization::Regularization;
 use crate::testing::Random;
 
@@ -139,7 +139,8 @@ fn products_are_as_exact_as_they_need_be() {
 
 /// Solves for values from earlier solutions, to a tolerance of 1e-9.
 fn from(earlier: &[Arc<Solution>], solver: &Solver, values: &[f64]) -> Arc<Solution> {
-    let found = Solution::starting(solver, Sought { values, earlier }, Mean::Zero, &Unobserved).unwrap();
+    let found =
+        Solution::starting(solver, RightHandSide { values, earlier }, Mean::Zero, &Unobserved).unwrap();
     assert!(found.relative_residual <= 1e-9, "{}", found.relative_residual);
     Arc::new(found)
 }

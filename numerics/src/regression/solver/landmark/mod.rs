@@ -53,7 +53,7 @@ use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
 use crate::regression::sums::expansion::Expansion;
 use normal::NormalEquations;
-use pivots::{Chosen, SAMPLE};
+use pivots::{LandmarkChoice, SAMPLE};
 pub use probe::{expected_landmarks, probe_price};
 pub(super) use residual::TrueResidual;
 use rows::{Coordinates, Rows};
@@ -98,7 +98,7 @@ struct Refinement {
 }
 
 /// What the landmarks make of some values.
-pub(super) struct Fitted {
+pub(super) struct LandmarkFit {
     /// Λ, `[n]`: `D⁻¹(Y − u)`.
     pub weights: Vec<f64>,
     /// b, `[r]`.
@@ -120,7 +120,7 @@ impl Landmarks {
     pub(super) fn of(system: &System, observer: &dyn Observer) -> Result<Self> {
         observer.enter(Stage::Gram);
         let weighing = Weighing::of(system);
-        let mut chosen = Chosen::among_sample(system, observer)?;
+        let mut chosen = LandmarkChoice::among_sample(system, observer)?;
         // A look at a few points beforehand saves most of the passes over all that would be in vain.
         let beyond =
             if system.n_points() > SAMPLE { chosen.beyond_at_some(system, observer)? } else { Vec::new() };
@@ -140,7 +140,7 @@ impl Landmarks {
         }
         let NormalEquations { inner, of_one, remaining, .. } = normal;
         let of_kernel = chosen.rows.coordinates() == Coordinates::AtLandmarks;
-        let Chosen { rows, tolerance } = chosen;
+        let LandmarkChoice { rows, tolerance } = chosen;
         let noise = |point: usize| (weighing.scale / weighing.weights[point]).ln();
         let log_noise: f64 = (0..system.n_points()).map(noise).sum();
         let of_factor =
@@ -203,7 +203,7 @@ impl Landmarks {
     ///
     /// # Errors
     /// [`crate::error::NumericsError::Cancelled`].
-    pub(super) fn fit(&self, values: &[f64], observer: &dyn Observer) -> Result<Fitted> {
+    pub(super) fn fit(&self, values: &[f64], observer: &dyn Observer) -> Result<LandmarkFit> {
         let mut unknowns = self.unknowns(values, 1, observer)?;
         let at_points = match self.rows.coordinates() {
             Coordinates::Whitened => {
@@ -224,7 +224,7 @@ impl Landmarks {
         };
         let rest = values.iter().zip(&at_points).zip(&weights);
         let energy = native_norm_squared + rest.map(|((y, u), w)| (y - u) * w).sum::<f64>();
-        Ok(Fitted { weights, at_landmarks, at_points, native_norm_squared, energy })
+        Ok(LandmarkFit { weights, at_landmarks, at_points, native_norm_squared, energy })
     }
 
     /// The weights b of an expansion: in the order of the points, if all of them are landmarks.

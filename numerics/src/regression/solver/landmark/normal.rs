@@ -5,7 +5,7 @@ use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::{Accum, Mat, MatRef};
 
 use super::Weighing;
-use super::pivots::Chosen;
+use super::pivots::LandmarkChoice;
 use super::rows::Coordinates;
 use crate::error::{NumericsError, Result};
 use crate::machine::parallelism::parallelism;
@@ -33,7 +33,7 @@ impl NormalEquations {
     /// [`NumericsError::Cancelled`].
     pub(super) fn of(
         system: &System,
-        chosen: &Chosen,
+        chosen: &LandmarkChoice,
         weighing: &Weighing,
         observer: &dyn Observer,
     ) -> Result<Self> {

@@ -43,13 +43,13 @@ const PART_OF_NOISE: f64 = 1e-6;
 const LARGEST_SHARE: f64 = 1e-2;
 
 /// Landmarks with what may remain of the diagonal.
-pub(super) struct Chosen {
+pub(super) struct LandmarkChoice {
     pub rows: Rows,
     /// τ, V².
     pub tolerance: f64,
 }
 
-impl Chosen {
+impl LandmarkChoice {
     /// Chooses among a sample of the points.
     ///
     /// # Errors

@@ -1,6 +1,6 @@
 //! The residual of the true system, `Y − (K + D)Λ`.
 
-use super::{Fitted, Landmarks};
+use super::{LandmarkFit, Landmarks};
 use crate::error::Result;
 use crate::machine::random::Random;
 use crate::machine::vector::norm;
@@ -37,7 +37,7 @@ impl TrueResidual {
     pub(in crate::regression::solver) fn of(
         landmarks: &Landmarks,
         values: &[f64],
-        fitted: &Fitted,
+        fitted: &LandmarkFit,
         observer: &dyn Observer,
     ) -> Result<Self> {
         let noise = landmarks.system.regularization();
@@ -56,7 +56,7 @@ impl TrueResidual {
     fn of_all(
         landmarks: &Landmarks,
         values: &[f64],
-        fitted: &Fitted,
+        fitted: &LandmarkFit,
         observer: &dyn Observer,
     ) -> Result<Self> {
         let (system, n) = (&landmarks.system, values.len());

@@ -38,11 +38,11 @@ pub(super) struct Rows {
     nodes: Nodes,
     l11: Mat<f64>,
     coordinates: Coordinates,
-    kept: Option<Kept>,
+    kept: Option<StoredRows>,
 }
 
 /// The rows of all points, where they are few.
-struct Kept {
+struct StoredRows {
     /// What remains of the diagonal, `[n]`.
     remaining: Vec<f64>,
     /// F or M, transposed, `[r, n]`.
@@ -125,7 +125,7 @@ impl Rows {
         }
         let mut numbers = vec![0.0; n_numbers];
         let remaining = self.fill(system.kernel(), system.cloud(), &mut numbers, observer)?;
-        self.kept = Some(Kept { remaining, numbers });
+        self.kept = Some(StoredRows { remaining, numbers });
         Ok(())
     }
 
@@ -143,7 +143,7 @@ impl Rows {
         }
         let left = |row: &[f64]| kernel.at_zero() - dot(row, row);
         let remaining = numbers.chunks_exact(rank).map(left).collect();
-        self.kept = Some(Kept { remaining, numbers });
+        self.kept = Some(StoredRows { remaining, numbers });
     }
 
     /// Bytes of the rows that are kept.
@@ -161,7 +161,7 @@ impl Rows {
         observer: &dyn Observer,
         mut take: impl FnMut(Range<usize>, Block<'_>),
     ) -> Result<()> {
-        if let Some(Kept { remaining, numbers }) = &self.kept {
+        if let Some(StoredRows { remaining, numbers }) = &self.kept {
             let rows = MatRef::from_column_major_slice(numbers, self.n_landmarks(), remaining.len());
             observer.checkpoint()?;
             take(0..remaining.len(), Block { remaining, rows });

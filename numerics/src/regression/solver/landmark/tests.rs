@@ -217,9 +217,9 @@ fn a_few_hundred_points_tell_how_many_landmarks_all_need() {
 
 /// Counts checkpoints, of which each follows a block of pivots.
 #[derive(Default)]
-struct Counted(AtomicUsize);
+struct CheckpointCounter(AtomicUsize);
 
-impl Observer for Counted {
+impl Observer for CheckpointCounter {
     fn enter(&self, _: Stage) {}
 
     fn is_cancelled(&self) -> bool {
@@ -233,7 +233,7 @@ fn a_rough_kernel_is_given_up_after_a_block_of_pivots() {
     let (torus, noise) = (torus(2_500), Regularization::Uniform(1e-2));
     let n_checkpoints = |length_scale: f64, family: Family| {
         let kernel = Kernel::new(family, length_scale, 1.0).unwrap();
-        let counted = Counted::default();
+        let counted = CheckpointCounter::default();
         expected_landmarks(&torus, &kernel, &noise, 500, &counted).unwrap();
         counted.0.into_inner()
     };

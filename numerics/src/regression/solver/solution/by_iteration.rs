@@ -2,7 +2,7 @@
 
 use super::candidate::{Candidate, MAX_RELATIVE_RESIDUAL, norm2};
 use super::warm_start::warm_start;
-use super::{Solution, Sought};
+use super::{RightHandSide, Solution};
 use crate::error::{NotDefinite, NumericsError, Result};
 use crate::observer::Observer;
 use crate::regression::solver::Solver;
@@ -67,7 +67,7 @@ impl Solution {
     pub(super) fn iterated(
         solver: &Solver,
         iterative: &Iterative,
-        sought: Sought<'_>,
+        sought: RightHandSide<'_>,
         observer: &dyn Observer,
     ) -> Result<Self> {
         let (values, tolerance) = (sought.values, iterative.tolerance());

@@ -53,12 +53,12 @@ pub struct Solution {
 ///
 /// A solver that iterates starts from the earlier ones. The others have no use for them.
 #[derive(Clone, Copy)]
-pub struct Sought<'a> {
+pub struct RightHandSide<'a> {
     pub values: &'a [f64],
     pub earlier: &'a [Arc<Solution>],
 }
 
-impl<'a> Sought<'a> {
+impl<'a> RightHandSide<'a> {
     /// Values of a system that was not solved before.
     pub fn first(values: &'a [f64]) -> Self {
         Self { values, earlier: &[] }
@@ -67,7 +67,7 @@ impl<'a> Sought<'a> {
 
 /// What was solved before with the same system.
 #[derive(Default)]
-pub struct Known {
+pub struct EarlierSolutions {
     /// Weights of the values that are asked for.
     pub these: Option<Arc<Solution>>,
     /// Weights of other values, or to another tolerance. The latest is first.
@@ -82,7 +82,7 @@ impl Solution {
     /// [`NumericsError::LengthMismatch`], [`NumericsError::WeightsOverflow`], [`NumericsError::Cancelled`].
     /// [`NumericsError::NotPositiveDefinite`] if the residual exceeds 1e-5 or the backward error 1e-13.
     pub fn of(solver: &Solver, values: &[f64], observer: &dyn Observer) -> Result<Self> {
-        Ok(Self::with_jets(solver, Sought::first(values), None, observer)?.0)
+        Ok(Self::with_jets(solver, RightHandSide::first(values), None, observer)?.0)
     }
 
     /// Computes [`Solution::of`] for a function with a mean, and finds the value that the others explain
@@ -91,7 +91,7 @@ impl Solution {
     /// # Errors
     /// [`NumericsError::MeanNotDetermined`], and the errors of [`Solution::of`].
     pub fn with_mean(solver: &Solver, values: &[f64], mean: Mean, observer: &dyn Observer) -> Result<Self> {
-        Self::starting(solver, Sought::first(values), mean, observer)
+        Self::starting(solver, RightHandSide::first(values), mean, observer)
     }
 
     /// Computes [`Solution::with_mean`], from earlier solutions where that takes less work. Weights depend on
@@ -101,18 +101,18 @@ impl Solution {
     /// Returns the errors of [`Solution::with_mean`].
     pub fn starting(
         solver: &Solver,
-        sought: Sought<'_>,
+        sought: RightHandSide<'_>,
         mean: Mean,
         observer: &dyn Observer,
     ) -> Result<Self> {
-        let Sought { values, earlier } = sought;
+        let RightHandSide { values, earlier } = sought;
         solver.cloud().check_one_per_point(values)?;
         observer.enter(Stage::Solve);
         let found = match Trend::fit(solver, values, mean, observer)? {
             None => Self::with_jets(solver, sought, None, observer)?.0,
             Some(trend) => {
                 let rest = trend.removed_from(values, solver.cloud());
-                let rest = Sought { values: &rest, earlier };
+                let rest = RightHandSide { values: &rest, earlier };
                 Self { trend: Some(trend), ..Self::with_jets(solver, rest, None, observer)?.0 }
             }
         };
@@ -127,7 +127,7 @@ impl Solution {
     /// [`NumericsError::Overflow`] of derivatives, and the errors of [`Solution::of`].
     pub(crate) fn with_jets(
         solver: &Solver,
-        sought: Sought<'_>,
+        sought: RightHandSide<'_>,
         order: Option<JetOrder>,
         observer: &dyn Observer,
     ) -> Result<(Self, Option<Jets>)> {

@@ -5,7 +5,7 @@
 //! least squares of `y − Σⱼ cⱼ A wⱼ` take no pass over pairs of points (Fischer 1998, "Projection techniques
 //! for iterative solution of Ax = b with successive right-hand sides").
 
-use super::Sought;
+use super::RightHandSide;
 use super::candidate::Candidate;
 use crate::error::Result;
 use crate::machine::vector::{dot, norm};
@@ -31,10 +31,10 @@ struct Direction {
 /// [`crate::error::NumericsError::Cancelled`].
 pub(super) fn warm_start(
     solver: &Solver,
-    sought: Sought<'_>,
+    sought: RightHandSide<'_>,
     observer: &dyn Observer,
 ) -> Result<Option<Candidate>> {
-    let Sought { values, earlier } = sought;
+    let RightHandSide { values, earlier } = sought;
     let mut left = Direction { weights: vec![0.0; values.len()], product: values.to_vec() };
     let mut basis: Vec<Direction> = Vec::with_capacity(earlier.len());
     for solution in earlier.iter().filter(|solution| solution.product.len() == values.len()) {

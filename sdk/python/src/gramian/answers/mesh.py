@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from trimesh import Trimesh
 
 SUPPORT = ("observed", "bridged", "extrapolated")
-"""What a vertex can rest on, from most to least certain. Files have the position in this list."""
+"""Support of a vertex, from most to least certain. Files have the position in this list."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

@@ -109,7 +109,7 @@ class SurfaceOfCloud(RegisteredCloud):
         Returns
         -------
         Mesh
-            `vertices`, `cells`, `normals` and what each vertex rests on, `support`. Curvatures and standard
+            `vertices`, `cells`, `normals` and the `support` of each vertex. Curvatures and standard
             deviations if requested.
 
         Examples

@@ -36,14 +36,14 @@ struct AtVertices {
 }
 
 /// A mesh with its vertices as queries.
-struct Meshed {
+struct QueriedMesh {
     found: LevelSet,
     vertices: Arc<Cloud>,
     /// Share of the points with two sides. Absent for a level of values.
     closedness: Option<f64>,
 }
 
-impl Meshed {
+impl QueriedMesh {
     /// Fails with `empty` if the mesh has no vertices.
     fn new(found: LevelSet, closedness: Option<f64>, empty: Problem) -> Result<Self, Problem> {
         let vertices = Cloud::new(found.mesh.vertices.clone(), found.mesh.dimension).map_err(|_| empty)?;
@@ -69,7 +69,7 @@ pub fn of_surface(
             "no surface was found here; ask for the surface local, or for a longer length scale"
         }
     };
-    let meshed = Meshed::new(found, Some(closedness.share), Problem::invalid_request("/step", empty))?;
+    let meshed = QueriedMesh::new(found, Some(closedness.share), Problem::invalid_request("/step", empty))?;
     let (k, d) = (meshed.vertices.n_points(), meshed.vertices.dimension());
     let mut at = AtVertices::default();
     let mut diagnostics = fitted.diagnostics(&Report::of_surface(surface), k);
@@ -106,7 +106,7 @@ pub fn of_values(
     let made = mesh_of_level(field, &work.options, observer);
     let found = made.map_err(|error| fits.main.refused(error))?;
     let empty = format!("the function does not reach {level} near the points; choose another level");
-    let meshed = Meshed::new(found, None, Problem::invalid_request("/level", empty))?;
+    let meshed = QueriedMesh::new(found, None, Problem::invalid_request("/level", empty))?;
     let (k, d) = (meshed.vertices.n_points(), meshed.vertices.dimension());
     let asked = JetRequest {
         queries: &meshed.vertices,
@@ -209,7 +209,7 @@ fn warning_of_far(parts: &[Part]) -> Option<Warning> {
 
 fn answer(
     work: &LevelSetWork,
-    meshed: Meshed,
+    meshed: QueriedMesh,
     at: AtVertices,
     mut diagnostics: Diagnostics,
 ) -> Result<LevelSetResponse, Problem> {

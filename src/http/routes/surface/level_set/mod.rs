@@ -86,7 +86,7 @@ request! {
     }
 }
 
-/// What a vertex rests on.
+/// Support of a vertex by the points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum VertexSupport {
@@ -128,7 +128,7 @@ answer! {
         cells: Integers as Vec<Vec<usize>>,
         /// The normal at each vertex, of length 1.
         normals: Array as Vec<Vec<f64>>,
-        /// What each vertex rests on.
+        /// Support of each vertex by the points.
         support: Vec<VertexSupport>,
         /// The distance of each vertex from the level, to first order, in the unit of the points.
         ///
@@ -173,8 +173,8 @@ operation! {
 /// space), followed from the points of the cloud on a lattice with edges of `step`. The mesh is a
 /// manifold, and closed wherever `bounds` does not cut it. Without `values` it is the surface that the
 /// cloud samples: the level of its signature function, or for large clouds that of local regressions,
-/// closed by winding numbers where the cloud has holes. Each vertex says what it rests on. With
-/// `include`, vertices have curvatures and error bars.
+/// closed by winding numbers where the cloud has holes. The `support` of a vertex is `observed`, `bridged`
+/// or `extrapolated`. With `include`, vertices have curvatures and error bars.
 pub async fn compute_level_set(LevelSetRequest) -> LevelSetResponse;
 path: "/v1/level-set", tag: "geometry", answer: "The mesh"
 }

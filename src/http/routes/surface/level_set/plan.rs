@@ -9,7 +9,7 @@ use crate::http::problem::catalogue;
 use crate::http::routes::surface::common::{check_is_surface, geometry_request};
 use crate::http::serve::operation::Plan;
 use crate::http::serve::plan::{Cost, FittedCloud, Values};
-use crate::http::serve::planner::{GivenValues, Planner, Restricted};
+use crate::http::serve::planner::{GivenValues, Planner, RestrictedQuantity};
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::machine::price::{Price, Sizes};
@@ -107,8 +107,11 @@ impl LevelSetRequest {
         values: Vec<f64>,
     ) -> Result<Plan<LevelSetWork>, Problem> {
         let asked = self.asked();
-        let restricted =
-            Restricted { name: "level sets of values", pointer: "/values", without: &[SolverKind::Local] };
+        let restricted = RestrictedQuantity {
+            name: "level sets of values",
+            pointer: "/values",
+            without: &[SolverKind::Local],
+        };
         let fit = Fit { mean: self.mean, ..self.take_fit() };
         let (main, values) = planner.values_fit(fit, GivenValues::one(values), Some(restricted))?;
         let size = self.checked_size(&main.on, true)?;

@@ -8,7 +8,7 @@ use crate::http::serve::answers::values::mean_coefficients;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan};
 use crate::http::serve::plan::Cost;
-use crate::http::serve::planner::{Planner, Restricted, ValuesUse, value_lists};
+use crate::http::serve::planner::{Planner, RestrictedQuantity, ValuesUse, value_lists};
 use gramian_host::answer;
 use gramian_host::compute::JobObserver;
 use gramian_host::wire::read::points::{Points, ValueLists};
@@ -98,7 +98,8 @@ impl Operation for InterpolationBatchRequest {
         let given = value_lists(std::mem::take(&mut self.values))?;
         let fit = Fit { mean: self.mean, ..self.take_fit() };
         let has_deviations = has_deviations(self.include);
-        let of_batch = Restricted { name: "batches", pointer: "/solver", without: &[SolverKind::Local] };
+        let of_batch =
+            RestrictedQuantity { name: "batches", pointer: "/solver", without: &[SolverKind::Local] };
         let (mut main, values) = planner.values_fit(fit, given, Some(of_batch))?;
         let queries = planner.queries(self.queries, &mut main.on)?;
         let (n, m, d) = (main.on.n_points(), queries.n_points(), queries.dimension());

@@ -24,7 +24,7 @@ use gramian_numerics::model::Report;
 use gramian_numerics::regression::function::interpolant::Interpolant;
 use gramian_numerics::regression::selection::{
     CloudSize, Criterion, Hyperparameters, LeaveOneOut, MAX_EVALUATIONS, Observations, Parameter, ScalePrior,
-    SearchSize, Selected, Selection, Variation, alpha_path, alpha_path_price, default_alphas,
+    SearchResult, SearchSize, Selection, Variation, alpha_path, alpha_path_price, default_alphas,
     expected_evaluations, leave_one_out_price, leave_one_out_with, select, selection_price,
 };
 use gramian_numerics::regression::solver::trend::Trend;
@@ -346,7 +346,11 @@ impl Work {
 }
 
 /// Returns the slopes of the selection for each of `n_given` entries of `vary`. Null for `nu`.
-fn score_gradient(selected: &Selected, variations: &[(usize, Variation)], n_given: usize) -> Vec<Nullable> {
+fn score_gradient(
+    selected: &SearchResult,
+    variations: &[(usize, Variation)],
+    n_given: usize,
+) -> Vec<Nullable> {
     let n_axes = selected.hyperparameters.length_scales.len();
     let mut gradient = vec![Nullable(None); n_given];
     let mut slopes = selected.gradient.iter();
@@ -396,7 +400,7 @@ fn path_over_alpha(
     Ok(alphas.iter().zip(scores).map(entry).collect())
 }
 
-fn family_scores(selected: &Selected) -> Vec<FamilyScore> {
+fn family_scores(selected: &SearchResult) -> Vec<FamilyScore> {
     let one = |&(family, score): &(Family, Option<f64>)| {
         let nu = if let Family::Matern { order } = family { Some(nu_of(order)) } else { None };
         FamilyScore { family: family.into(), nu, score: Nullable(score) }

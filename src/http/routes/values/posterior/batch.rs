@@ -1,6 +1,6 @@
 //! `POST /v1/posterior/batch`: Gaussian process posteriors of many lists of values, with one factorization.
 
-use super::work::{Asked, Found, Work};
+use super::work::{PosteriorArrays, PosteriorParts, Work};
 use super::{PosteriorOf, PosteriorQuantity, Samples};
 use crate::http::fields::{Diagnostics, Fit, MeanChoice, request};
 use crate::http::problem::Problem;
@@ -102,12 +102,12 @@ impl Operation for PosteriorBatchRequest {
         let fit = Fit { mean: self.mean, ..self.take_fit() };
         let Self { include, samples, quantiles, threshold, of, queries, .. } = self;
         let (include, of) = (include.unwrap_or_default(), of.unwrap_or_default());
-        let asked = Asked { include, samples, quantiles, threshold, of };
+        let asked = PosteriorParts { include, samples, quantiles, threshold, of };
         Work::plan(planner, fit, given, queries, asked)
     }
 
     fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<PosteriorBatchResponse, Problem> {
-        let found = Found::each(work, fits, observer)?;
+        let found = PosteriorArrays::each(work, fits, observer)?;
         Ok(PosteriorBatchResponse {
             means: found.means,
             variances: found.variances,

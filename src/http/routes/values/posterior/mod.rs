@@ -18,7 +18,7 @@ use gramian_host::compute::JobObserver;
 use gramian_host::wire::read::members::present_unless_empty;
 use gramian_host::wire::read::points::Points;
 use gramian_host::wire::write::array::Array;
-use work::{Asked, Found, Work};
+use work::{PosteriorArrays, PosteriorParts, Work};
 
 /// Optional parts of a posterior, beside its mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, ToSchema)]
@@ -150,12 +150,12 @@ impl Operation for PosteriorRequest {
         let fit = Fit { mean: self.mean, ..self.take_fit() };
         let Self { include, samples, quantiles, threshold, of, queries, .. } = self;
         let (include, of) = (include.unwrap_or_default(), of.unwrap_or_default());
-        let asked = Asked { include, samples, quantiles, threshold, of };
+        let asked = PosteriorParts { include, samples, quantiles, threshold, of };
         Work::plan(planner, fit, given, queries, asked)
     }
 
     fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<PosteriorResponse, Problem> {
-        let found = Found::one(work, fits, observer)?;
+        let found = PosteriorArrays::one(work, fits, observer)?;
         Ok(PosteriorResponse {
             means: found.means,
             variances: found.variances,

@@ -9,7 +9,7 @@ use crate::http::serve::answers::values::mean_coefficients;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::Plan;
 use crate::http::serve::plan::{Cost, PlannedValues, Values};
-use crate::http::serve::planner::{GivenValues, Planner, Restricted, check_seed};
+use crate::http::serve::planner::{GivenValues, Planner, RestrictedQuantity, check_seed};
 use gramian_host::compute::JobObserver;
 use gramian_host::wire::read::points::Points;
 use gramian_host::wire::write::array::Array;
@@ -30,7 +30,7 @@ use gramian_numerics::regression::function::samples::{Root, Stream};
 use gramian_numerics::regression::sums::jets::JetOrder;
 
 /// Optional parts of an answer, beside the means.
-pub struct Asked {
+pub struct PosteriorParts {
     pub include: Vec<Q>,
     pub samples: Option<Samples>,
     pub quantiles: Option<Vec<f64>>,
@@ -39,7 +39,7 @@ pub struct Asked {
     pub of: PosteriorOf,
 }
 
-impl Asked {
+impl PosteriorParts {
     fn wants(&self, quantity: Q) -> bool {
         self.include.contains(&quantity)
     }
@@ -63,16 +63,20 @@ impl Asked {
     }
 
     /// Returns a part of the answer that not every solver has, if one is asked for: that which fewest have.
-    fn restricted(&self) -> Option<Restricted> {
+    fn restricted(&self) -> Option<RestrictedQuantity> {
         let not_local: &[SolverKind] = &[SolverKind::Local];
         if self.wants(Q::LogMarginalLikelihood) {
             let without: &[SolverKind] = &[SolverKind::Local, SolverKind::Iterative];
-            return Some(Restricted { name: "log_marginal_likelihood", pointer: "/include", without });
+            return Some(RestrictedQuantity {
+                name: "log_marginal_likelihood",
+                pointer: "/include",
+                without,
+            });
         }
         if self.wants(Q::Covariance) {
-            return Some(Restricted { name: "covariance", pointer: "/include", without: not_local });
+            return Some(RestrictedQuantity { name: "covariance", pointer: "/include", without: not_local });
         }
-        self.samples.map(|_| Restricted { name: "samples", pointer: "/samples", without: not_local })
+        self.samples.map(|_| RestrictedQuantity { name: "samples", pointer: "/samples", without: not_local })
     }
 
     fn check(&self) -> Result<(), Problem> {
@@ -141,7 +145,7 @@ pub struct Work {
     /// `[k, n]`
     values: Arc<Values>,
     queries: Arc<Cloud>,
-    asked: Asked,
+    asked: PosteriorParts,
 }
 
 impl Work {
@@ -154,10 +158,11 @@ impl Work {
         fit: Fit,
         given: GivenValues,
         queries: Option<Points>,
-        asked: Asked,
+        asked: PosteriorParts,
     ) -> Result<Plan<Self>, Problem> {
         asked.check()?;
-        let of_batch = Restricted { name: "batches", pointer: "/solver", without: &[SolverKind::Local] };
+        let of_batch =
+            RestrictedQuantity { name: "batches", pointer: "/solver", without: &[SolverKind::Local] };
         let restricted = asked.restricted().or(given.n_lists.map(|_| of_batch));
         let (mut main, values) = planner.values_fit(fit, given, restricted)?;
         let queries = planner.queries(queries, &mut main.on)?;
@@ -183,7 +188,7 @@ impl Work {
 }
 
 /// The computed parts of an answer.
-pub struct Found {
+pub struct PosteriorArrays {
     pub means: Array,
     pub variances: Option<Array>,
     pub observation_variances: Option<Array>,
@@ -212,7 +217,7 @@ struct Means {
     leading: Vec<usize>,
 }
 
-impl Found {
+impl PosteriorArrays {
     /// Computes the posterior of one list of values.
     ///
     /// # Errors
@@ -329,7 +334,7 @@ const AT_ONCE: usize = 1 << 14;
 
 /// Normal distributions at the queries: means `[k, m]` and variances `[m]`.
 struct Bands<'a> {
-    asked: &'a Asked,
+    asked: &'a PosteriorParts,
     means: &'a [f64],
     variances: Option<&'a Variances>,
     /// Variance added to those of the latent function.

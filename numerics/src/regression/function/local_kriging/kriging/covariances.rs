@@ -2,13 +2,13 @@
 
 use pulp::Simd;
 
-use super::Factored;
+use super::FactoredBatch;
 use crate::machine::registers::IN_FLIGHT;
 use crate::regression::function::local_kriging::batch::Batch;
 use crate::regression::function::local_kriging::parts::{CROSS, QUANTITIES, VALUES};
 use crate::regression::sums::side_by_side::{SideBySide, scaling};
 
-impl<S: Simd> Factored<'_, S> {
+impl<S: Simd> FactoredBatch<'_, S> {
     /// Fills the triangle with `K + noise`.
     #[inline(always)]
     pub(super) fn fill_triangle(&mut self) {

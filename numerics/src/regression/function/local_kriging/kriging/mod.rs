@@ -18,12 +18,12 @@ use super::parts::Parts;
 use crate::kernel::Kernel;
 use crate::machine::lanes::{self, COLUMNS, Layout, Lower, MAX_LANES};
 use crate::machine::registers::Pack;
-use rounding::Guarded;
+use rounding::GuardedRounding;
 
 /// Buffers for one batch.
 pub(super) struct Workspace {
     systems: lanes::Workspace,
-    /// Results, `[numbers, lanes]`, in the order of [`Found`](super::parts::Found).
+    /// Results, `[numbers, lanes]`, in the order of [`RowOffsets`](super::parts::RowOffsets).
     pub found: Vec<f64>,
 }
 
@@ -53,7 +53,7 @@ impl WithSimd for Krige<'_> {
         let (found, _) = S::as_mut_simd_f64s(&mut workspace.found);
         let n = batch.n_places();
         let lower = Lower { simd, layout: Layout::in_blocks(n), registers };
-        let mut system = Factored { lower, n, batch, kernel, parts };
+        let mut system = FactoredBatch { lower, n, batch, kernel, parts };
         system.fill_triangle();
         system.fill_rows();
         system.fill_derivatives();
@@ -65,7 +65,7 @@ impl WithSimd for Krige<'_> {
 }
 
 /// A batch during its factorization, with the rows of [`Parts`] below the triangle.
-struct Factored<'a, S: Simd> {
+struct FactoredBatch<'a, S: Simd> {
     lower: Lower<'a, S>,
     n: usize,
     batch: &'a Batch,
@@ -73,11 +73,11 @@ struct Factored<'a, S: Simd> {
     parts: Parts,
 }
 
-impl<S: Simd> Factored<'_, S> {
+impl<S: Simd> FactoredBatch<'_, S> {
     #[inline(always)]
     fn factorize(&mut self) {
         let solved = self.n..self.n + self.parts.n_solved();
-        let rounding = Guarded::new(self.kernel, self.n);
+        let rounding = GuardedRounding::new(self.kernel, self.n);
         self.lower.factorize_wide(solved, &rounding);
     }
 

@@ -10,7 +10,7 @@ use crate::regression::solver::PIVOT_TOLERANCE;
 use crate::regression::sums::side_by_side::VANISHES;
 
 /// Rounding of a factor without the points that depend on others, and without entries next to nothing.
-pub(super) struct Guarded {
+pub(super) struct GuardedRounding {
     /// The least conditional variance of a point that is kept. Smaller ones are rounding, since such a point
     /// follows from those before it.
     dependent: f64,
@@ -20,7 +20,7 @@ pub(super) struct Guarded {
     values: usize,
 }
 
-impl Guarded {
+impl GuardedRounding {
     /// Returns the rounding for a kernel and n points.
     #[inline(always)]
     pub(super) fn new(kernel: &Kernel, n: usize) -> Self {
@@ -29,7 +29,7 @@ impl Guarded {
     }
 }
 
-impl<S: Simd> Rounding<S> for Guarded {
+impl<S: Simd> Rounding<S> for GuardedRounding {
     const JOINS_PRODUCTS: bool = false;
 
     #[inline(always)]

@@ -2,16 +2,16 @@
 
 use pulp::Simd;
 
-use super::Factored;
+use super::FactoredBatch;
 use crate::machine::lanes::triangle;
-use crate::regression::function::local_kriging::parts::{CROSS, Found, QUANTITIES, VALUES};
+use crate::regression::function::local_kriging::parts::{CROSS, QUANTITIES, RowOffsets, VALUES};
 
-impl<S: Simd> Factored<'_, S> {
-    /// Writes the results of the batch, in the order of [`Found`].
+impl<S: Simd> FactoredBatch<'_, S> {
+    /// Writes the results of the batch, in the order of [`RowOffsets`].
     #[inline(always)]
     pub(super) fn sum_up(&mut self, found: &mut [S::f64s]) {
         let (d, n, parts) = (self.batch.dimension, self.n, self.parts);
-        let places = Found::of(d);
+        let places = RowOffsets::of(d);
         let (values, cross, weights) = (self.row(VALUES), self.row(CROSS), self.row(parts.weights()));
         self.lower.product(values, cross).write(found, 0);
         let mut n_dependent = self.lower.splat(0.0);

@@ -26,16 +26,16 @@ const BYTES_PER_SECOND: f64 = (4 << 20) as f64;
 #[derive(Debug, Clone)]
 pub(super) struct WithTimeouts {
     inner: Arc<dyn ObjectStore>,
-    patience: Patience,
+    timeouts: Timeouts,
 }
 
 /// Time limits of calls.
 #[derive(Debug, Clone, Copy)]
-struct Patience {
+struct Timeouts {
     answering: Duration,
 }
 
-impl Patience {
+impl Timeouts {
     /// Returns the result of a call, or an error if it takes longer than allowed for `n_bytes`.
     async fn wait<T>(self, n_bytes: usize, call: impl Future<Output = Result<T>>) -> Result<T> {
         let most = self.answering + Duration::from_secs_f64(n_bytes as f64 / BYTES_PER_SECOND);
@@ -62,7 +62,7 @@ fn late(most: Duration) -> Error {
 
 impl WithTimeouts {
     pub(super) fn new(inner: Arc<dyn ObjectStore>) -> Self {
-        Self { inner, patience: Patience { answering: ANSWERING } }
+        Self { inner, timeouts: Timeouts { answering: ANSWERING } }
     }
 }
 
@@ -78,7 +78,7 @@ impl fmt::Display for WithTimeouts {
 #[deny(clippy::missing_trait_methods)]
 impl ObjectStore for WithTimeouts {
     async fn put_opts(&self, name: &Path, payload: PutPayload, options: PutOptions) -> Result<PutResult> {
-        self.patience.wait(payload.content_length(), self.inner.put_opts(name, payload, options)).await
+        self.timeouts.wait(payload.content_length(), self.inner.put_opts(name, payload, options)).await
     }
 
     async fn put_multipart_opts(
@@ -86,14 +86,14 @@ impl ObjectStore for WithTimeouts {
         name: &Path,
         options: PutMultipartOptions,
     ) -> Result<Box<dyn MultipartUpload>> {
-        let inner = self.patience.wait(0, self.inner.put_multipart_opts(name, options)).await?;
-        Ok(Box::new(UploadWithTimeouts { inner, patience: self.patience, n_bytes: 0 }))
+        let inner = self.timeouts.wait(0, self.inner.put_multipart_opts(name, options)).await?;
+        Ok(Box::new(UploadWithTimeouts { inner, timeouts: self.timeouts, n_bytes: 0 }))
     }
 
     async fn get_opts(&self, name: &Path, options: GetOptions) -> Result<GetResult> {
-        let mut found = self.patience.wait(0, self.inner.get_opts(name, options)).await?;
+        let mut found = self.timeouts.wait(0, self.inner.get_opts(name, options)).await?;
         if let GetResultPayload::Stream(pieces) = found.payload {
-            found.payload = GetResultPayload::Stream(self.patience.each(pieces));
+            found.payload = GetResultPayload::Stream(self.timeouts.each(pieces));
         }
         Ok(found)
     }
@@ -101,15 +101,15 @@ impl ObjectStore for WithTimeouts {
     async fn get_ranges(&self, name: &Path, ranges: &[Range<u64>]) -> Result<Vec<Bytes>> {
         let n_bytes = ranges.iter().map(|range| range.end.saturating_sub(range.start)).sum::<u64>();
         let n_bytes = usize::try_from(n_bytes).unwrap_or(usize::MAX);
-        self.patience.wait(n_bytes, self.inner.get_ranges(name, ranges)).await
+        self.timeouts.wait(n_bytes, self.inner.get_ranges(name, ranges)).await
     }
 
     fn delete_stream(&self, names: BoxStream<'static, Result<Path>>) -> BoxStream<'static, Result<Path>> {
-        self.patience.each(self.inner.delete_stream(names))
+        self.timeouts.each(self.inner.delete_stream(names))
     }
 
     fn list(&self, folder: Option<&Path>) -> BoxStream<'static, Result<ObjectMeta>> {
-        self.patience.each(self.inner.list(folder))
+        self.timeouts.each(self.inner.list(folder))
     }
 
     fn list_with_offset(
@@ -117,19 +117,19 @@ impl ObjectStore for WithTimeouts {
         folder: Option<&Path>,
         offset: &Path,
     ) -> BoxStream<'static, Result<ObjectMeta>> {
-        self.patience.each(self.inner.list_with_offset(folder, offset))
+        self.timeouts.each(self.inner.list_with_offset(folder, offset))
     }
 
     async fn list_with_delimiter(&self, folder: Option<&Path>) -> Result<ListResult> {
-        self.patience.wait(0, self.inner.list_with_delimiter(folder)).await
+        self.timeouts.wait(0, self.inner.list_with_delimiter(folder)).await
     }
 
     async fn copy_opts(&self, from: &Path, to: &Path, options: CopyOptions) -> Result<()> {
-        self.patience.wait(0, self.inner.copy_opts(from, to, options)).await
+        self.timeouts.wait(0, self.inner.copy_opts(from, to, options)).await
     }
 
     async fn rename_opts(&self, from: &Path, to: &Path, options: RenameOptions) -> Result<()> {
-        self.patience.wait(0, self.inner.rename_opts(from, to, options)).await
+        self.timeouts.wait(0, self.inner.rename_opts(from, to, options)).await
     }
 }
 
@@ -137,7 +137,7 @@ impl ObjectStore for WithTimeouts {
 #[derive(Debug)]
 struct UploadWithTimeouts {
     inner: Box<dyn MultipartUpload>,
-    patience: Patience,
+    timeouts: Timeouts,
     n_bytes: usize,
 }
 
@@ -146,17 +146,17 @@ impl MultipartUpload for UploadWithTimeouts {
     fn put_part(&mut self, payload: PutPayload) -> UploadPart {
         let n_bytes = payload.content_length();
         self.n_bytes += n_bytes;
-        let (patience, part) = (self.patience, self.inner.put_part(payload));
-        Box::pin(patience.wait(n_bytes, part))
+        let (timeouts, part) = (self.timeouts, self.inner.put_part(payload));
+        Box::pin(timeouts.wait(n_bytes, part))
     }
 
     /// Waits for all bytes of the upload, because a directory only now writes them to the disk.
     async fn complete(&mut self) -> Result<PutResult> {
-        self.patience.wait(self.n_bytes, self.inner.complete()).await
+        self.timeouts.wait(self.n_bytes, self.inner.complete()).await
     }
 
     async fn abort(&mut self) -> Result<()> {
-        self.patience.wait(0, self.inner.abort()).await
+        self.timeouts.wait(0, self.inner.abort()).await
     }
 }
 
@@ -173,7 +173,7 @@ mod tests {
 
     fn patient(config: ThrottleConfig) -> WithTimeouts {
         let store = ThrottledStore::new(InMemory::new(), config);
-        WithTimeouts { inner: Arc::new(store), patience: Patience { answering: Duration::from_millis(1) } }
+        WithTimeouts { inner: Arc::new(store), timeouts: Timeouts { answering: Duration::from_millis(1) } }
     }
 
     #[tokio::test]
