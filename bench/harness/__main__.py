@@ -66,7 +66,7 @@ def write_results(groups: list[Group], facts: list[tuple[str, str]], is_disturbe
         summary += " **The machine was not idle: all times are disturbed, and verdicts may be chance.**"
     notes = (ROOT / "bench" / "notes.md").read_text().strip()
     parts = [
-        "# Results\n\nWritten by `bench/run`; [README.md](README.md) says how to read it. Times are the best of several "
+        "# Results\n\nWritten by `bench/run`; [README.md](README.md) explains how to read it. Times are the best of several "
         "rounds in which ours and the reference take turns, and in brackets the median; the ratio is that of the best, and in "
         f"brackets that of the medians. {summary}",
         "\n".join(["| | |", "|---|---|", *(f"| {name} | {value} |" for name, value in facts)]),

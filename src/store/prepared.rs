@@ -161,7 +161,7 @@ impl<E: Clone + Send + Sync + 'static> PreparedStore<E> {
 
     /// Waits for `n_bytes` bytes of memory for work, as long as they are wanted.
     ///
-    /// Cached entries that are not in use make room. Before anything is evicted, `is_wanted` is asked again.
+    /// Cached entries that are not in use make room. Before anything is evicted, `is_wanted` is called again.
     /// Returns `None` once it is false. A caller that waits must hold no other memory of this store, nor wait
     /// for anybody who does.
     ///

@@ -20,13 +20,13 @@ MATERN = {"family": "matern", "nu": 1.5, "length_scale": 0.5}
 LAPLACE = {"family": "laplace", "epsilon": 0, "length_scale": 0.5}
 ITERATIVE = {"solver": "iterative", "alpha": ALPHA}
 N_POINTS = 100_000
-#: Agreement of the faces at a vertex from which their mean says which side is outside.
+# : Agreement of the faces at a vertex from which their mean tells the outside.
 AGREEMENT = 0.9
 
 
 @dataclass(frozen=True)
 class Goal:
-    """What is asked of one function through many points."""
+    """Benchmarks of one function through many points."""
 
     n_points: int
     tolerance: float
@@ -167,6 +167,6 @@ def iterations(work: Answered) -> int:
 
 
 def said(work: Answered) -> dict[str, Figure]:
-    """What the answer says of itself."""
+    """Diagnostics of the answer."""
     residual = work.members["diagnostics"]["relative_residual"]
     return {"residual": Figure(residual), "iterations": Figure(iterations(work))}

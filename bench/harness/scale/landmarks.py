@@ -113,7 +113,7 @@ class Landmarks:
         return Work(what, (*costs(45, 1.5), *accurate(1e-6, 1e-6)), {}, ours, nobody)
 
     def _gpytorch(self, method: str, data: dict[str, Floats], request: Mapping[str, Any]) -> Iterable[Entry]:
-        """GPyTorch where it is asked for, with the largest error of its means over the largest mean."""
+        """GPyTorch where it is requested, with the largest error of its means over the largest mean."""
         if not self.setting.with_gpytorch:
             return
         found = self.peers.python(method, data, length_scale=request["kernel"]["length_scale"], alpha=request["alpha"])
@@ -185,7 +185,7 @@ def off(found: Answered, expected: Answered) -> dict[str, Figure]:
 
 
 def said(work: Answered) -> dict[str, Figure]:
-    """What the answer says of itself."""
+    """Diagnostics of the answer."""
     diagnostics = work.members["diagnostics"]
     return {"residual": Figure(diagnostics["relative_residual"]), "rank": Figure(diagnostics["rank"])}
 

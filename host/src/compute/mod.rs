@@ -19,7 +19,7 @@
 //!
 //! NOTHING WAITS ON A POOL. A thread that waits for parts of its job meanwhile executes another job, on top
 //! of its stack. So a job must not wait for another job. While it calls on the pool, it must not hold
-//! anything that another job may want: a lock, a cell or a channel. Whatever several jobs may want at once is
+//! anything that another job may want: a lock, a cell or a channel. Whatever several jobs may need at once is
 //! awaited before the job begins, through the flights of the store. clippy.toml forbids the calls that could
 //! break this. Each exception states why it is safe.
 

@@ -176,7 +176,7 @@ impl Admission {
     }
 
     /// Records that the request was computed to its end. Its time in turns calibrates later predictions. The
-    /// waits between them say how busy the server was.
+    /// waits between them measure the load of the server.
     pub fn finish(&self) {
         let mut state = self.places.state();
         let admitted = state.admitted.get(&self.id);

@@ -74,7 +74,7 @@ impl Progress {
     }
 
     pub(super) fn solved_to(&self, relative_residual: f64) {
-        // A residual beyond float64 says nothing.
+        // A residual beyond float64 is no measure of progress.
         self.state().residual = Some(relative_residual).filter(|residual| residual.is_finite());
     }
 

@@ -70,7 +70,7 @@ impl Compressor {
     }
 }
 
-/// Bytes read at a time. The observer is asked once per block whether anybody still waits.
+/// Bytes read at a time. Cancellation is checked once per block.
 const BLOCK_BYTES: usize = 64 << 10;
 
 /// Decompresses a body into at most `limit` bytes.

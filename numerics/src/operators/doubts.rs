@@ -1,9 +1,9 @@
 //! Answers of operators that the values do not support.
 //!
-//! A learned kernel is the one that the values want, and its deviations say how far off answers are. A given
-//! kernel may not fit the values. It may be too wide for what they show, have less noise than they have, or
-//! be about 0 where they have an offset. For a given kernel, errors are those of the served answers if the
-//! values come from the process that would have been learned.
+//! A learned kernel fits the values, and its deviations are about as large as its errors. A given kernel may
+//! not fit the values. It may be too wide for what they show, have less noise than they have, or be about 0
+//! where they have an offset. For a given kernel, errors are those of the served answers if the values come
+//! from the process that would have been learned.
 
 use rayon::prelude::*;
 
@@ -193,9 +193,9 @@ impl Findings<'_> {
     /// Computes the largest deviation of a sure answer, from deviations at some queries.
     ///
     /// Squares f² of the answers are those of the true answers plus those of the errors e. Between points of
-    /// random density errors differ so much that their mean says nothing. So the mean square of the true
-    /// answers is the s² for which `Σ f²/(s² + e²)` is the number of queries (Paule and Mandel 1982). A few
-    /// queries may all lie where there is nothing to find: the prior counts like [`N_BEFOREHAND`] more.
+    /// random density errors differ so much that their mean carries no information. So the mean square of the
+    /// true answers is the s² for which `Σ f²/(s² + e²)` is the number of queries (Paule and Mandel 1982). A
+    /// few queries may all lie where there is nothing to find: the prior counts like [`N_BEFOREHAND`] more.
     fn most(&self, deviations: impl Iterator<Item = (usize, f64)>, functionals: &[JetFunctional]) -> f64 {
         let k = self.n_components();
         let prior: f64 = functionals.iter().map(|functional| functional.prior_variance(self.kernel)).sum();

@@ -17,7 +17,7 @@ const BULKY: f64 = 0.1;
 
 /// Sums over a piece that decide its side.
 pub(super) struct Evidence {
-    /// Area where the gradients say something.
+    /// Area where gradients have a sign.
     pub total: f64,
     /// Vote of the gradients by area, for the signs of the piece as they are.
     pub vote: f64,

@@ -31,7 +31,7 @@ const BOUNDING_SHARE: f64 = 0.2;
 const CLOSED: f64 = 0.2;
 const MAX_OFF: f64 = 0.03;
 
-/// Least number of points of a piece whose sign is asked for. A smaller one contributes less to winding
+/// Least number of points of a piece whose sign is estimated. A smaller one contributes less to winding
 /// numbers than they are off.
 const LEAST_PIECE: usize = 12;
 

@@ -2,9 +2,9 @@
 //!
 //! A level of larger means has less noise, but misses what is smaller than its neighbourhoods: fine detail,
 //! and the ends of fillets and planes. Its own deviations do not say so. The finest level, whose deviations
-//! are honest, tells: let a and c be what a fine and a coarse level say of a quantity, with variances σ_a² >
-//! σ_c². If the coarse one has no bias, `Δ = a − c` has the variance `V = σ_a² − σ_c²`, since c makes the
-//! better use of the same points (Hausman 1978). With a bias of variance b² it has `V + b²`, and the best
+//! are honest, tells: let a and c be the estimates of a quantity by a fine and a coarse level, with variances
+//! σ_a² > σ_c². If the coarse one has no bias, `Δ = a − c` has the variance `V = σ_a² − σ_c²`, since c makes
+//! the better use of the same points (Hausman 1978). With a bias of variance b² it has `V + b²`, and the best
 //! estimate is `c + λΔ`, `λ = b²/(b² + V)`, of variance `σ_c² + λV`.
 //!
 //! How large b² is differs between places. The mixture of ratios b²/V that makes the differences at the sites

@@ -15,7 +15,7 @@ use crate::points::cloud::Cloud;
 use crate::points::neighbours::Neighbour;
 use crate::points::sampling::median;
 
-/// Least share of places at which the surface is so sure that slopes of the points say something of it.
+/// Least share of places at which the surface is so sure that slopes of the points are informative.
 const LEAST_SHARE: f64 = 0.2;
 
 /// Parts of a neighbourhood whose points are looked at, and the greatest slopes over the expected ones at

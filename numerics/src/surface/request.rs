@@ -33,9 +33,9 @@ pub struct GeometryRequest {
     /// Queries beyond them are null. If there are more queries than this in all, the offset model confirms no
     /// curvatures either.
     pub max_offsets: usize,
-    /// True if standard deviations are asked for.
+    /// True if standard deviations are requested.
     pub has_deviations: bool,
-    /// True if the normals of both sheets at sharp edges are asked for, which only regressions find.
+    /// True if the normals of both sheets at sharp edges are requested, which only regressions find.
     pub has_edge_normals: bool,
 }
 

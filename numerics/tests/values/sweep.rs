@@ -48,7 +48,8 @@ pub struct Case {
 /// Names of the quantities.
 pub const QUANTITIES: [&str; 5] = ["value", "gradient", "Hessian", "surface gradient", "Laplace–Beltrami"];
 
-/// Indices of the quantities that depend on the surface alone. Values at its points say nothing across it.
+/// Indices of the quantities that depend on the surface alone. Values at its points do not determine the
+/// function across it.
 pub const ON_SURFACE: [usize; 3] = [0, 3, 4];
 
 /// Errors and error bars of all clouds of a row, by quantity.

@@ -118,7 +118,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         Some(write(objects, holder, cloud, encode).await.unwrap_or_else(StoreOutcome::Pending))
     }
 
-    /// Finds a cloud in memory. The store is asked first if the cloud was last seen there `trust` ago or
+    /// Finds a cloud in memory. The store is queried first if the cloud was last seen there `trust` ago or
     /// earlier. While the store does not answer, the cloud in memory is assumed to be still stored.
     pub async fn recall(
         &self,

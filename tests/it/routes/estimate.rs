@@ -193,7 +193,7 @@ async fn what_one_key_sends_changes_the_estimates_of_another_by_at_most_a_factor
     }
     let after = seconds_as(&server, "modest", &known(0.5)).await;
     assert!((0.499..=2.001).contains(&(after / of_modest)), "{of_modest} s before, {after} s after");
-    // Values that need no iteration say nothing of others, not even to the key that sent them.
+    // Values that need no iteration do not affect the price of others, not even for the same key.
     let after = seconds_as(&server, "greedy", &known(0.5)).await;
     assert!((0.999..=1.001).contains(&(after / of_greedy)), "{of_greedy} s before, {after} s after");
 }

@@ -1,7 +1,7 @@
 //! Small systems side by side: each lane of a register holds one of several systems of equal size.
 //!
 //! A system is a lower triangle with rows of right-hand sides below it, one register an entry. The Cholesky
-//! factorization K = LLᵀ turns the rows below into their products with L⁻ᵀ. What is asked of a system then
+//! factorization K = LLᵀ turns the rows below into their products with L⁻ᵀ. What a system is solved for then
 //! follows from inner products of these rows.
 
 mod factor;

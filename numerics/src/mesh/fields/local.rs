@@ -77,12 +77,12 @@ pub struct LocalField<'a> {
     jump: f64,
     /// +1, or −1 if the normals of the points point inward.
     side: f64,
-    /// True if the heights alone are the field, since winding numbers of open sheets say nothing.
+    /// True if the heights alone are the field, since winding numbers of open sheets are meaningless.
     is_open: bool,
 }
 
 impl<'a> LocalField<'a> {
-    /// Prepares the field, and says how far the points enclose something. `is_open` says that they need not.
+    /// Prepares the field, and measures how far the points enclose something. With `is_open` they need not.
     ///
     /// # Errors
     /// `NumericsError::Cancelled`.

@@ -1,4 +1,5 @@
-//! The lattice that follows a surface, and what its simplices have of it: nodes, roots on edges, and cuts.
+//! The lattice that follows a surface: its nodes, the roots on its edges, and the polygons cut from its
+//! cells.
 
 pub(super) mod cut;
 pub(super) mod follow;

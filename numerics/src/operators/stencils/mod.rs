@@ -62,8 +62,8 @@ impl Operator {
     ///
     /// The result is `[m, n]`, unit 1/L², or `[d, m, n]`, unit 1/L. Over the nodes themselves, no eigenvalue
     /// of the Laplace–Beltrami operator has a positive real part beyond rounding. Its rows at a rim are those
-    /// of a boundary that nothing flows through, and are flagged. Rows are empty for null queries that are
-    /// not nodes, and in a cloud of one position.
+    /// of a no-flux boundary, and are flagged. Rows are empty for null queries that are not nodes, and in a
+    /// cloud of one position.
     ///
     /// # Errors
     /// `NumericsError::DimensionMismatch`, `NumericsError::Overflow`, `NumericsError::Cancelled`.

@@ -4,8 +4,8 @@
 //! Rows of this kind alone make a matrix without eigenvalues of positive real part (Gershgorin). Weights
 //! `w_j = v_j/|t_j|²` with v_j ≥ 0 are exact for polynomials of degree 2 if `Σ w_j t_j = 0` and
 //! `Σ w_j t_j t_jᵀ = 2I`. Where nodes do not surround the query, at a rim for example, no such weights exist.
-//! Then the weights with the least squared error of these moments act like a boundary that nothing flows
-//! through.
+//! Then the weights with the least squared error of these moments act like a no-flux (homogeneous Neumann)
+//! boundary.
 
 use faer::Mat;
 use faer::linalg::solvers::Solve;

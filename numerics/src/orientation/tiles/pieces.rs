@@ -23,7 +23,7 @@ pub(super) struct Member<'a> {
     pub region: &'a Region,
     /// Sign relative to the other regions of the piece.
     pub relative: f64,
-    /// True if the signature function says something of the side of the region, in any tile.
+    /// True if the signature function determines the side of the region in any tile.
     pub has_sign: bool,
 }
 

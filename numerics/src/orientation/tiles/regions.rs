@@ -20,7 +20,7 @@ use crate::points::sampling::Sampling;
 pub struct Tile<'a> {
     /// Points that the tile answers for, ascending.
     pub own: &'a [usize],
-    /// Points whose signature function says which side is outward.
+    /// Points whose signature function determines the outward side.
     pub coarse: &'a [usize],
 }
 
@@ -30,7 +30,7 @@ pub(crate) struct SignedPoints<'a> {
     pub sampling: &'a Sampling,
     /// Unit vectors `[n, d]`, zero where there is none.
     pub normals: &'a [f64],
-    /// True where the signature function says something of the side of a point, `[n]`.
+    /// True where the signature function determines the side of a point, `[n]`.
     pub has_sign: &'a [bool],
 }
 
@@ -41,7 +41,7 @@ pub(crate) struct SignedPoints<'a> {
 pub struct Region {
     /// Number of points.
     pub n_points: usize,
-    /// Number of points where the signature function says something of the side.
+    /// Number of points where the signature function determines the side.
     pub n_signed: usize,
     /// Number of points that define the signature function.
     pub n_coarse: usize,
@@ -72,7 +72,7 @@ pub struct Border {
     pub opposing: f64,
 }
 
-/// Regions of one tile, and what it knows of their borders.
+/// Regions of one tile, and the borders between them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TileRegions {
     pub regions: Vec<Region>,

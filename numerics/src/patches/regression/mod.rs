@@ -80,7 +80,7 @@ pub(crate) struct Krige<'a> {
     pub batch: &'a Batch,
     pub model: &'a Model,
     pub workspace: &'a mut Workspace,
-    /// True if derivatives at the query are asked for, besides the likelihood.
+    /// True if derivatives at the query are requested, besides the likelihood.
     pub predicts: bool,
 }
 

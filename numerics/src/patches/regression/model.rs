@@ -37,8 +37,8 @@ impl Trend {
         }
     }
 
-    /// Returns whether a neighbourhood says what it is: it leaves degrees of freedom, and none of its terms
-    /// is nearly a sum of those before it.
+    /// Returns whether a neighbourhood determines the model: it leaves degrees of freedom, and none of its
+    /// terms is nearly a sum of those before it.
     ///
     /// `independence` is the least share of the square of a term, `|f|² = fᵀK⁻¹f`, that those before it do
     /// not explain. It is 0.06 and more where 40 to 50 points in space and 20 to 30 on a surface are random,

@@ -58,7 +58,7 @@ impl Interpolant {
     ///
     /// # Errors
     /// - `NumericsError::DimensionMismatch`.
-    /// - `NumericsError::KernelNotSmooth` if derivatives are asked for at a point of the cloud and the
+    /// - `NumericsError::KernelNotSmooth` if derivatives are requested at a point of the cloud and the
     ///   kernel has a kink there.
     /// - `NumericsError::Overflow`, `NumericsError::Cancelled`.
     pub fn at(&self, queries: &Cloud, order: JetOrder, observer: &dyn Observer) -> Result<Jets> {

@@ -1,4 +1,4 @@
-//! What values say of functionals: whitened covariances, and the determinant.
+//! Information of values about functionals: whitened covariances, and the determinant.
 
 use faer::prelude::ReborrowMut;
 use faer::{Mat, MatMut, Par};
@@ -41,7 +41,7 @@ impl WhitenedColumns {
 }
 
 impl Solver {
-    /// The points whose covariances with a functional say what the values know of it.
+    /// The points whose covariances with a functional determine its posterior.
     pub(crate) fn known_points(&self) -> &Cloud {
         match &self.factorization {
             Factorization::Landmark(landmarks) => landmarks.cloud(),

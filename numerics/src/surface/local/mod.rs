@@ -59,7 +59,7 @@ pub enum Learning {
 /// Optional knowledge of a surface beside its points.
 #[derive(Clone, Copy, Default)]
 pub struct Given<'a> {
-    /// Normals of the points, `[n, d]`, of any length but 0. They say which side is outward.
+    /// Normals of the points, `[n, d]`, of any length but 0. They determine the outward side.
     pub normals: Option<&'a Cloud>,
     pub learning: Option<&'a Learning>,
 }
@@ -303,7 +303,7 @@ fn orient(
     OrientedNormals::of_directions(&sampled, directions, sides.are_given)
 }
 
-/// Turns a normal to the side of a direction. Returns whether the direction says something of the side.
+/// Turns a normal to the side of a direction. Returns whether the direction determines the side.
 fn turn_along(normal: &mut [f64], direction: &[f64]) -> bool {
     let along = dot(normal, direction);
     if along < 0.0 {

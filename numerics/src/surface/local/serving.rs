@@ -92,7 +92,7 @@ impl LocalSurface {
         (0..places.n_points()).into_par_iter().map_init(Vec::new, doubt).collect()
     }
 
-    /// Why an answer is null or doubtful, if it is. `doubt` is what neighbours say of it.
+    /// Reason why an answer is null or doubtful, if it is. `doubt` is the verdict of the neighbours.
     fn reason(
         &self,
         geometry: &PatchGeometry,

@@ -2,12 +2,12 @@
 //!
 //! A kernel that is too wide or too narrow for the sampling gives smooth, wrong curvatures. Two estimates do
 //! not depend on the kernel (T4). A quadric through some neighbours is cheap and coarse. The offset model on
-//! a patch costs as much as a hundred quadrics. Where the quadric agrees, nothing more is asked. Where it
-//! does not, the patch decides.
+//! a patch costs as much as a hundred quadrics. Where the quadric agrees, that is enough. Where it does not,
+//! the patch decides.
 //!
 //! Small clouds, of which a patch may see both sides, have a third criterion (T3). It asks whether the
 //! signature function would have predicted the points nearby, had each of them been left out. It covers all
-//! points at the price of a few patches. So where the quadric nearly agrees, T3 is asked before the patch.
+//! points at the price of a few patches. So where the quadric nearly agrees, T3 is computed before the patch.
 
 use super::SignatureSurface;
 use super::offset::offset_jet_at;
@@ -24,7 +24,7 @@ const CONFIRMED_BY_PATCH: f64 = 0.10;
 /// quadric is the coarser of the two.
 const CONFIRMED_OFFSET: f64 = 0.20;
 
-/// Difference from the quadric up to which leaving points out is asked before the patch.
+/// Difference from the quadric up to which points are left out before a patch is computed.
 const CONFIRMED_WITH_PREDICTION: f64 = 0.10;
 
 /// Standard error of the curvatures of the quadric, over the largest curvature, beyond which nothing is
@@ -137,7 +137,7 @@ impl CurvatureCandidate<'_> {
     fn is_predicted(&self, surface: &SignatureSurface, share: f64) -> bool {
         let Some(misses) = surface.left_out_misses() else { return false };
         let nearest = surface.sampling.neighbours().nearest_positions(self.x, SPACING_NEIGHBOURS);
-        // The prediction says nothing away from the points, and at a rim, where no point shows the other
+        // The prediction is meaningless away from the points, and at a rim, where no point shows the other
         // side.
         let is_at_point =
             nearest.first().is_some_and(|found| found.squared_distance <= (0.5 * self.spacing).powi(2));

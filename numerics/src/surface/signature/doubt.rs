@@ -1,8 +1,8 @@
 //! Normals that the points around them do not confirm.
 //!
 //! A smooth kernel with a small α follows the noise and the edges of a scan. Quadrics through a few points
-//! see some of it. Where they do not plainly agree, the local regression is asked, because it knows how far
-//! off it may be itself.
+//! see some of it. Where they do not plainly agree, the local regression decides, because it estimates how
+//! far off it may be itself.
 
 use super::SignatureSurface;
 use crate::error::Result;

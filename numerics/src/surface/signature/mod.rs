@@ -143,7 +143,7 @@ impl SignatureSurface {
         self.left_out_misses.get()?.as_deref()
     }
 
-    /// Local regressions of the same points, made when deviations are asked for or a normal is in doubt.
+    /// Local regressions of the same points, made when deviations are requested or a normal is in doubt.
     ///
     /// # Errors
     /// Returns the errors of [`Patches::of`].

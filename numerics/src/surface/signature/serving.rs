@@ -28,7 +28,7 @@ use crate::surface::served::{GeometryArrays, ServedBy, Verdict};
 /// gradient must be normal to the quadric.
 const ON_SURFACE_SPACINGS: f64 = 0.5;
 
-/// Computes gradient, Hessian, sign and flag at each query, with deviations if they are asked for.
+/// Computes gradient, Hessian, sign and flag at each query, with deviations if they are requested.
 ///
 /// # Errors
 /// Returns the errors of [`crate::regression::function::interpolant::Interpolant::at`].
@@ -68,7 +68,7 @@ pub(crate) fn serve(
 
 /// Points and quadrics around the queries.
 enum Surroundings {
-    /// The queries are the points of the cloud, so the surface knows what is around them.
+    /// The queries are the points of the cloud, so their neighbourhoods are cached.
     OfPoints,
     /// Nearest points of the queries, with quadrics of their own where curvatures are checked against them.
     OfQueries { around: Neighbourhoods, quadrics: Option<LocalQuadrics> },

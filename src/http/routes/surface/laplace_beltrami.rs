@@ -204,7 +204,8 @@ operation! {
 /// third order for second derivatives. The matrix needs no kernel for values and takes any number of nodes.
 ///
 /// If the queries are the nodes, no eigenvalue has a positive real part, so the matrix can be used for time
-/// steps. To achieve this, rows at a rim are those of a boundary that nothing flows through, and are flagged.
+/// steps. To achieve this, rows at a rim are those of a no-flux (homogeneous Neumann) boundary, and are
+/// flagged.
 /// `diagnostics.stencils` counts rows of each kind.
 pub async fn assemble_laplace_beltrami_sparse_matrix(LaplaceBeltramiSparseMatrixRequest) -> LaplaceBeltramiSparseMatrixResponse;
 path: "/v1/laplace-beltrami/sparse-matrix", tag: "operators", answer: "The matrix"

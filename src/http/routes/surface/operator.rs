@@ -60,7 +60,7 @@ pub struct StencilWork {
 pub struct AppliedAnswer {
     /// The operator at each query: `[m]` for Laplace–Beltrami, `[m, d]` for the surface gradient.
     pub values: Array,
-    /// Standard deviations in the shape of `values`, if they are asked for.
+    /// Standard deviations in the shape of `values`, if they are requested.
     pub deviations: Option<Array>,
     pub flags: Vec<Flag>,
     pub diagnostics: Diagnostics,

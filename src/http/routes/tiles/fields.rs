@@ -13,7 +13,7 @@ use gramian_numerics::orientation::tiles;
 pub struct Region {
     /// Number of points.
     pub n_points: usize,
-    /// Number of points where the coarse cloud says something of the side.
+    /// Number of points where the coarse cloud determines the side.
     pub n_signed: usize,
     /// Number of points of the coarse cloud.
     pub n_coarse: usize,

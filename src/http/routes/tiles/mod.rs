@@ -1,7 +1,7 @@
 //! Routes for clouds that are answered in tiles, each a part of the cloud with what surrounds it.
 //!
-//! `coarse` chooses the points that say which side of the whole is outward. `regions` sums up what each tile
-//! knows of the sides of its surface, and `sides` joins the sums of all tiles.
+//! `coarse` chooses the points whose signature function orients the whole. `regions` groups the points of a
+//! tile into consistently oriented regions, and `sides` orients the regions of all tiles.
 
 pub mod coarse;
 mod fields;

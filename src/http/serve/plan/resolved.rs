@@ -85,7 +85,7 @@ impl Default for Process {
 }
 
 impl FitPlan {
-    /// Merges duplicates if the request wants that, and derives the key of the fit.
+    /// Merges duplicates if requested, and derives the key of the fit.
     pub(super) fn of(
         on: FittedCloud,
         chosen: ChosenRecipe,

@@ -71,7 +71,7 @@ pub(super) fn only_local_finds_edges() -> Problem {
 /// Returns the tolerance of a request.
 ///
 /// # Errors
-/// Returns 422 for one that is out of range, or where another solver is asked for, which has none.
+/// Returns 422 for one that is out of range, or where another solver is requested, which has none.
 pub(super) fn checked_tolerance(fit: &Fit) -> Result<f64, Problem> {
     let refused = |detail: String| Err(Problem::invalid_request("/tolerance", detail));
     match (fit.tolerance, fit.solver) {

@@ -1,4 +1,4 @@
-//! What planning has to know of a kernel: whether few landmarks span it.
+//! Probe before planning: whether few landmarks span a kernel.
 
 use std::sync::Arc;
 

@@ -224,7 +224,7 @@ impl<'a> Planner<'a> {
 
     /// Checks the fits of values and of the surface under them, for an operator on the values.
     ///
-    /// Values are kriged around each query if they exceed the dense limit, or if the client wants that.
+    /// Values are kriged around each query if they exceed the dense limit, or if the client requests it.
     ///
     /// # Errors
     /// Returns a [`Problem`] with a pointer to the field.

@@ -166,9 +166,9 @@ impl LocalKriging {
     ///
     /// # Errors
     /// - `NumericsError::DimensionMismatch`, `NumericsError::LengthMismatch`.
-    /// - `NumericsError::KernelNotSmooth` if derivatives are asked for at a point of the cloud and the
+    /// - `NumericsError::KernelNotSmooth` if derivatives are requested at a point of the cloud and the
     ///   kernel has a kink there.
-    /// - `NumericsError::DerivativesVary` if deviations are asked for derivatives that the process lacks.
+    /// - `NumericsError::DerivativesVary` if deviations are requested derivatives that the process lacks.
     /// - `NumericsError::NotPositiveDefinite` if a variance is below −τ.
     /// - `NumericsError::Overflow`, `NumericsError::Cancelled`.
     pub fn at(

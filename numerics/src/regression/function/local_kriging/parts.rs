@@ -20,14 +20,14 @@ pub(super) struct Parts {
     ///
     /// None, the d first ones, or these and the upper triangle of the second ones.
     pub n_derivatives: usize,
-    /// Functionals of derivatives whose variances are asked for, in place of those of derivatives.
+    /// Functionals of derivatives whose variances are requested, in place of those of derivatives.
     pub n_functionals: usize,
     /// Functions of a mean with uncertain coefficients, which make variances larger.
     pub n_functions: usize,
 }
 
 impl Parts {
-    /// Quantities besides the value whose variances are asked for.
+    /// Quantities besides the value whose variances are requested.
     pub(super) const fn n_quantities(&self) -> usize {
         if self.n_functionals > 0 { self.n_functionals } else { self.n_derivatives }
     }

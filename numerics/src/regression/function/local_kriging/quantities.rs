@@ -1,4 +1,4 @@
-//! Quantities besides the value whose deviations are asked for.
+//! Quantities besides the value whose deviations are requested.
 
 use crate::error::{NumericsError, Result};
 use crate::kernel::Kernel;
@@ -9,7 +9,7 @@ use crate::regression::solver::trend::Basis;
 /// A function that returns the functionals of a query, equally many for each.
 pub(crate) type Functionals<'a> = &'a (dyn Fn(usize) -> Vec<JetFunctional> + Sync);
 
-/// The quantities besides the value whose deviations are asked for.
+/// The quantities besides the value whose deviations are requested.
 pub(super) enum Quantities<'a> {
     /// Derivatives: identical for all queries.
     Derivatives(Vec<Derivative>),

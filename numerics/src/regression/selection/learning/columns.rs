@@ -24,7 +24,7 @@ use crate::regression::selection::subject::Observations;
 use crate::regression::sums::regularization::Regularization;
 
 /// Largest numbers of rows and of columns of a table. More take too long beside a fit, and rows that are more
-/// say which columns matter by themselves: model selection on a sample of them finds their scales.
+/// determine which columns matter: model selection on a sample of them finds their scales.
 const MAX_ROWS: usize = 2000;
 const MAX_COLUMNS: usize = 16;
 

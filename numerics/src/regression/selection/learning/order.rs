@@ -43,7 +43,7 @@ pub(super) const PLACE: usize = 16;
 pub(super) const DEEP_GROUPS: usize = 16;
 pub(super) const GIVEN_DEEP: usize = 256;
 
-/// Largest number of groups of a half that a search uses. More of them say nothing new about hyperparameters.
+/// Largest number of groups of a half that a search uses. More of them do not change hyperparameters.
 pub(super) const MAX_GROUPS: usize = 96;
 
 /// Points whose values are explained, given those of others.

@@ -16,7 +16,7 @@ pub(super) const GIVEN: usize = 63;
 const SEED: u64 = 35;
 
 /// Growth of the set of points that is searched. A point is given those before it alone, so that about one in
-/// five of the points found is found in vain.
+/// five of the points found is not used.
 const GROWTH: f64 = 1.25;
 
 /// Searches between two looks whether to stop.

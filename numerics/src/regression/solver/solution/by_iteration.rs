@@ -16,7 +16,7 @@ use crate::regression::solver::landmark::{Landmarks, TrueResidual};
 /// Largest number of times that conjugate gradients begin, the last ones with what is left.
 const RESTARTS: usize = 3;
 
-/// Part of the iterations that prices assume. A solve with fewer says nothing of the duration of others.
+/// Part of the iterations that prices assume. A solve with fewer is not used to predict others.
 const LEAST_OF_PRICE: f64 = 0.5;
 
 /// Relative residual of the true system at which weights by landmarks are as good as those of a factor.

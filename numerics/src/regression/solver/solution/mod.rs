@@ -68,7 +68,7 @@ impl<'a> RightHandSide<'a> {
 /// What was solved before with the same system.
 #[derive(Default)]
 pub struct EarlierSolutions {
-    /// Weights of the values that are asked for.
+    /// Weights of the values that are requested.
     pub these: Option<Arc<Solution>>,
     /// Weights of other values, or to another tolerance. The latest is first.
     pub earlier: Vec<Arc<Solution>>,
@@ -120,7 +120,7 @@ impl Solution {
         Ok(Self { outlier, ..found })
     }
 
-    /// Computes [`Solution::of`], and the jets of the function at the points if they are asked for. Their
+    /// Computes [`Solution::of`], and the jets of the function at the points if they are requested. Their
     /// values are needed for the residual anyway.
     ///
     /// # Errors

@@ -1,6 +1,6 @@
 //! Check of values against the kernel and the noise that they were fitted with.
 //!
-//! A Gaussian process says how far each value may be from what the others predict. Where values are much
+//! A Gaussian process predicts each value from the others, with a standard deviation. Where values are much
 //! farther, its deviations are too short, there or everywhere.
 
 use faer::MatMut;

@@ -1,7 +1,7 @@
 //! Interpolation in a cluster's box, at Chebyshev's nodes along each axis.
 //!
 //! ```text
-//! k(x, y) ≈ Σ_kl S_k(x) k(x_k, y_l) S_l(y)   between two clusters that lie apart
+//! k(x, y) ≈ Σ_kl S_k(x) k(x_k, y_l) S_l(y)   between two well-separated clusters
 //! ```
 //!
 //! with the nodes x_k of one grid and y_l of the other. S_k is a product over the axes of Lagrange's
@@ -32,7 +32,7 @@ pub(super) struct Grid<'a> {
 }
 
 impl<'a> Grid<'a> {
-    /// Creates the grid that interpolates kernels to about this part of their size, in boxes that lie apart.
+    /// Creates the grid that interpolates kernels to about this part of their size, in well-separated boxes.
     ///
     /// Polynomials of degree p converge like `ρ⁻ᵖ`, where the kernel is analytic in an ellipse around the
     /// side of the box whose half-axes add up to ρ (Trefethen 2013, th. 8.2). Their foci are the ends of the

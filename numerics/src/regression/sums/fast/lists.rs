@@ -1,10 +1,10 @@
-//! Which clusters lie apart, and which do not.
+//! Pairs of clusters: well-separated ones, and those too near for interpolation.
 
 use super::clusters::{Cluster, Clusters};
 use crate::points::cloud::squared_distance;
 
 /// Largest ratio of the diameter of the larger cluster to the distance of the centres at which two clusters
-/// lie apart.
+/// are well separated.
 ///
 /// On a torus of 1,000,000 points, 0.6 and 0.85 took a tenth longer for equal errors.
 pub(super) const SEPARATION: f64 = 0.7;
@@ -12,7 +12,7 @@ pub(super) const SEPARATION: f64 = 0.7;
 /// For each cluster, by its index, those that it is paired with. Every two points are in one pair of
 /// clusters, in either order.
 pub(super) struct Lists {
-    /// Clusters that lie apart, whose kernels are interpolated.
+    /// Well-separated clusters, whose kernels are interpolated.
     pub far: Vec<Vec<u32>>,
     /// Clusters that do not, and are not halved any more.
     pub near: Vec<Vec<u32>>,

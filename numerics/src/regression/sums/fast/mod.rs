@@ -1,10 +1,11 @@
-//! Products `Kλ` in about n log n time: kernels between clusters that lie apart are interpolated.
+//! Products `Kλ` in about n log n time, by interpolation between well-separated clusters (a fast multipole
+//! method).
 //!
-//! The points are halved to a tree of clusters. Two clusters lie apart if their distance exceeds their size.
-//! There the kernel is smooth, and `k(x, y)` is interpolated at nodes in the boxes around them: weights of
-//! points become weights of nodes, kernels are evaluated between nodes, and values at nodes are interpolated
-//! at points. Clusters that are near each other are halved further. Pairs of points in the smallest ones that
-//! are near are evaluated as they are.
+//! The points are halved to a tree of clusters. Two clusters are well separated if their distance exceeds
+//! their size. Between them the kernel is smooth, and `k(x, y)` is interpolated at nodes in the boxes around
+//! them: weights of points become weights of nodes, kernels are evaluated between nodes, and values at nodes
+//! are interpolated at points. Clusters that are near each other are halved further. Pairs of points in the
+//! smallest ones that are near are evaluated as they are.
 //!
 //! Sources: Greengard and Rokhlin 1987; Fong and Darve 2009 for any kernel.
 

@@ -21,7 +21,7 @@ const COUNTED: usize = 64;
 /// Sources that are summed over at once: what they need fits into the nearest cache.
 const SOURCES: usize = 1024;
 
-/// The pairs of clusters, with the nodes of those that have pairs which lie apart.
+/// The pairs of clusters, with the nodes of those that have well-separated pairs.
 pub(crate) struct Plan<'a> {
     of: &'a FastSums,
     lists: Lists,
@@ -94,7 +94,7 @@ impl<'a> Plan<'a> {
         weights.collect()
     }
 
-    /// Values at the nodes of each cluster, by index, of all clusters that lie apart from it.
+    /// Values at the nodes of each cluster, by index, of all clusters that are well separated from it.
     fn fields_at_nodes(
         &self,
         of_nodes: &[Vec<Vec<f64>>],

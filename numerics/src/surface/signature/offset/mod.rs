@@ -9,7 +9,7 @@ use crate::points::quadric::n_coefficients;
 pub(crate) use layers::OffsetJet;
 use layers::{n_patch_points, offset_jet};
 
-/// Spacings from the nearest point up to which the offset model is asked.
+/// Spacings from the nearest point up to which the offset model is used.
 const REACH_SPACINGS: f64 = 2.0;
 
 /// Cosine to the normal of the nearest point above which a point belongs to the same side of the same sheet.

@@ -86,7 +86,7 @@ class Law:
 
 @dataclass(frozen=True)
 class Kriging:
-    """What is asked of every tile."""
+    """The request for every tile."""
 
     law: Law
     derivatives: int  # 0, 1 or 2

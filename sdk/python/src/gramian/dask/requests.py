@@ -1,4 +1,4 @@
-"""What is asked of a replica about the surface of a tile. It runs in tasks of Dask, and may be repeated."""
+"""Requests to a replica for the surface of a tile. They run in tasks of Dask, and may be repeated."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The surface of a cloud in tiles: what the cloud decides as a whole, and what each tile is asked.
+"""The surface of a cloud in tiles: decisions for the whole cloud, and requests for each tile.
 
 Noise and shape are learned around sites all over the cloud, and a coarse cloud says which side is outward. Each
 tile gets both. It finds regions in which its normals agree, and the regions of all tiles are joined in one place.
@@ -37,7 +37,7 @@ class Whole:
 
     hyperparameters: Hyperparameters  # what local regressions learned
     reach: int  # how many positions around a point its answers depend on
-    coarse: Part  # the coarse cloud, which says which side is outward
+    coarse: Part  # the coarse cloud, which determines the outward side
     fit: Fit  # of its signature function
 
     @classmethod
@@ -90,7 +90,7 @@ class SurfaceTile:
     own: Ints  # [m]: places of the points of the cell in `part`
     directions: Array  # [n, d]: outward by the coarse cloud
     labels: Ints  # [n]: the region of each point, or −1
-    regions: dict[str, Any]  # what the service says of the regions
+    regions: dict[str, Any]  # the answer of the service for the regions
 
     @property
     def rows(self) -> Ints:
@@ -174,7 +174,7 @@ class SurfaceTiles:
 
 
 def _sides(replicas: Replicas, tiles: list[Any]) -> list[Any]:
-    """Joins the regions of tiles. Only what they say of one another travels."""
+    """Joins the regions of tiles. Only sums over regions and borders are sent."""
     attribute, labelled = dask.delayed(getattr, pure=True), dask.delayed(SurfaceTile.labelled, pure=True)
     outer = [labelled(tile) for tile in tiles]
     seen = dask.delayed(np.concatenate, pure=True)([of_tile[0] for of_tile in outer])

@@ -18,7 +18,7 @@ from ..wire.problems import Overloaded, Problem
 T = TypeVar("T")
 
 ROUNDS = 4
-"""How often all replicas are asked before a task gives up; Dask's own retries come on top."""
+"""How often all replicas are tried before a task gives up; Dask's own retries come on top."""
 
 PAUSE_SECONDS = 1.0
 """The wait after the first round; doubled from one to the next. Longer where replicas ask for more."""
@@ -27,10 +27,10 @@ MAX_PAUSE_SECONDS = 60.0
 """What they may ask for."""
 
 CONNECT_SECONDS = 10.0
-"""The wait for a connection: a machine that is lost says nothing at all."""
+"""The wait for a connection: a machine that is lost does not answer."""
 
 SILENT_SECONDS = 30.0
-"""How long a replica that did not answer is asked after all others, by this process."""
+"""How long a replica that did not answer is tried after all others, by this process."""
 
 DEADLINE_EXCEEDED = 504
 """What would take as long anywhere else."""
@@ -88,7 +88,7 @@ class Replicas:
 
 
 _silent: dict[str, float] = {}
-"""Addresses that did not answer, with the time until which they are asked last. Of this process."""
+"""Addresses that did not answer, with the time until which they are tried last. Of this process."""
 
 
 def _noted(url: str, error: Problem | httpx.TransportError) -> float:

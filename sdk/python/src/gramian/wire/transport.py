@@ -17,7 +17,7 @@ from .problems import TRY_LATER, problem_of
 T = TypeVar("T")
 
 BACKOFF_SECONDS = 0.1
-"""First wait if the service does not say how long to wait. Doubled from one attempt to the next."""
+"""First wait if the service sends no `Retry-After`. Doubled from one attempt to the next."""
 
 CLOUD_HEADER = "Gramian-Cloud"
 """Header that names the cloud of a request for proxies.

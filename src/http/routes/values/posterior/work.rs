@@ -62,7 +62,7 @@ impl PosteriorParts {
         self.samples.map_or(0, |samples| samples.count)
     }
 
-    /// Returns a part of the answer that not every solver has, if one is asked for: that which fewest have.
+    /// Returns a part of the answer that not every solver has, if one is requested: that which fewest have.
     fn restricted(&self) -> Option<RestrictedQuantity> {
         let not_local: &[SolverKind] = &[SolverKind::Local];
         if self.wants(Q::LogMarginalLikelihood) {

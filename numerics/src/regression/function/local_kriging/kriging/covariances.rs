@@ -1,4 +1,4 @@
-//! Covariances among the values, and of the values with what is asked for at the query.
+//! Covariances among the values, and of the values with the requested quantities.
 
 use pulp::Simd;
 

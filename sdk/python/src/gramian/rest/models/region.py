@@ -18,7 +18,7 @@ class Region:
 
         Attributes:
             n_points (int): Number of points.
-            n_signed (int): Number of points where the coarse cloud says something of the side.
+            n_signed (int): Number of points where the coarse cloud determines the side.
             n_coarse (int): Number of points of the coarse cloud.
             area (float): The sum of a.
             centre (list[float]): The mean c of x, weighted with a.
