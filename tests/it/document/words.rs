@@ -68,16 +68,41 @@ const TABLES: [(&str, &str, &str); 4] = [
     ("docs/trust.md", "solver", "SolverUsed"),
 ];
 
+/// The rows of a table of a page: the name in the first column, and the text of the others.
+fn table(page: &str, head: &str) -> Vec<(String, String)> {
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(page)).unwrap();
+    let rows = text.lines().skip_while(|line| !line.starts_with(&format!("| {head} |"))).skip(2);
+    let parts = rows.map_while(|row| row.strip_prefix("| `")?.split_once("` |"));
+    parts.map(|(name, rest)| (name.to_owned(), rest.to_owned())).collect()
+}
+
 #[test]
 fn tables_list_what_exists() {
     let document = document();
     for (page, head, schema) in TABLES {
-        let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(page)).unwrap();
-        let rows = text.lines().skip_while(|line| !line.starts_with(&format!("| {head} |"))).skip(2);
-        let names = rows.map_while(|row| row.strip_prefix("| `")?.split_once('`').map(|(name, _)| name));
-        let listed: BTreeSet<&str> = names.collect();
+        let listed: BTreeSet<String> = table(page, head).into_iter().map(|(name, _)| name).collect();
         let words = document["components"]["schemas"][schema]["enum"].as_array().unwrap();
-        let existing: BTreeSet<&str> = words.iter().filter_map(Value::as_str).collect();
+        let existing: BTreeSet<String> = words.iter().filter_map(Value::as_str).map(str::to_owned).collect();
         assert_eq!(listed, existing, "{page}, {head}");
     }
+}
+
+/// The media types of the contents that a pointer leads to, over all operations. Pages are not answers of
+/// an operation, events and problems not its formats.
+fn media_types(document: &Value, pointer: &str) -> BTreeSet<String> {
+    let operations =
+        document["paths"].as_object().unwrap().values().flat_map(|item| item.as_object().unwrap());
+    let contents = operations.filter_map(|(_, operation)| operation.pointer(pointer)?.as_object());
+    let names = contents.flat_map(|content| content.keys().cloned());
+    names.filter(|name| name.starts_with("application/") || name.starts_with("model/")).collect()
+}
+
+#[test]
+fn the_table_of_formats_lists_those_of_bodies_and_answers() {
+    let (document, rows) = (document(), table("docs/api.md", "media type"));
+    let listed: BTreeSet<String> = rows.iter().map(|(name, _)| name.clone()).collect();
+    let is_read = |(_, rest): &&(String, String)| !rest.starts_with(" none |");
+    let of_bodies: BTreeSet<String> = rows.iter().filter(is_read).map(|(name, _)| name.clone()).collect();
+    assert_eq!(of_bodies, media_types(&document, "/requestBody/content"));
+    assert_eq!(listed, media_types(&document, "/responses/200/content"));
 }
