@@ -66,7 +66,8 @@ impl FairSemaphore {
             }
             receiver
         };
-        // The sender is dropped unsent only together with the lane. Then nobody counts turns any more.
+        // A sender is dropped without sending only when the semaphore itself is dropped. From then on turns
+        // are not counted.
         receiver.await.unwrap_or(Turn { of: None })
     }
 

@@ -82,8 +82,8 @@ impl Runner {
     async fn claim(&self, local: &LocalJob, name: &OwnerName) -> Result<Option<Attempt>, Unavailable> {
         let objects = &self.host.jobs.objects;
         let found = objects.find_job(name, local.id).await?;
-        // Another process may have begun the job while it waited here. If that process abandons it, the
-        // rounds find it.
+        // Another process may have begun the job while it waited in this process. If the other process
+        // abandons the job, the periodic rounds pick it up again.
         let is_to_do = |job: &JobObjects| job.is_open() && job.lease == local.last;
         let Some(job) = found.filter(is_to_do) else { return Ok(None) };
         let attempt = match job.lease {
@@ -137,7 +137,7 @@ impl Runner {
                 Err(error) => Err(error),
             };
             if let Err(error) = renewed {
-                // Another process may take the job up meanwhile. Either of them ends it.
+                // Another process may claim the job meanwhile. Whichever of the two finishes first ends it.
                 tracing::warn!(job = %local.id, %error, "the lease of a job is not written");
             }
         }

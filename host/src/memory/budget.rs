@@ -4,7 +4,8 @@
 //! for a gigabyte. Here small reservations never wait behind large ones: a part of the budget is closed to
 //! large reservations. Among the large ones, the owner holding least comes first; ties go by arrival. With
 //! several owners, none may hold more than half: a reservation beyond that is skipped until its owner gives
-//! bytes back. Any other is overtaken by a later one only if the owner of that one holds less.
+//! bytes back. Any other large reservation is overtaken by a later one only if the owner of the later one
+//! holds less.
 //!
 //! NO WAITING WHILE HOLDING. A caller that waits here must hold nothing that other waiters need. Callers
 //! therefore reserve all their bytes at once and split the reservation afterwards.

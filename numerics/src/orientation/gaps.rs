@@ -14,10 +14,11 @@ use crate::points::neighbours::Neighbour;
 /// Positions around a point among which points of other pieces are looked for.
 const REACH: usize = 32;
 
-/// Shortest edges between two pieces that vote at most. None is longer than twice the shortest one.
+/// Greatest number of edges between two pieces that vote, shortest first. None is longer than twice the
+/// shortest one.
 const N_VOTES: usize = 6;
 
-/// Mean weight of the votes from which two pieces are joined.
+/// Absolute mean of the weighted votes above which two pieces are joined.
 const SURE: f64 = 0.3;
 
 /// A short way from one piece to another.

@@ -38,7 +38,8 @@ pub use pooled::MAX_MODELS;
 
 pub use answers::{CurvatureDeviations, PatchGeometry};
 
-/// The greatest dimension of local regressions. Beyond it neighbourhoods say too little.
+/// The greatest dimension of local regressions. In higher dimensions neighbourhoods do not determine the
+/// surface well enough.
 pub const MAX_LOCAL_DIMENSION: usize = 4;
 
 /// A ratio of the variance of the noise to that of the heights, and how common it is.
@@ -62,7 +63,8 @@ pub struct PatchHyperparameters {
     pub flat_noise_ratios: Vec<NoiseRatio>,
     /// Mixture for a trend of fourth order. Empty where points have noise, or a quadric is as sure.
     pub quartic_noise_ratios: Vec<NoiseRatio>,
-    /// Levels of means, ascending by their points. Empty where points have no noise, or means are no surer.
+    /// Levels of means, in ascending order of points per mean. Empty where points have no noise, or where
+    /// means do not reduce the standard deviations.
     pub coarser: Vec<CoarserHyperparameters>,
     /// σ: standard deviation of the noise of the points across the surface, unit L.
     pub noise: f64,
@@ -85,8 +87,8 @@ pub struct CoarserHyperparameters {
     pub agreement: Agreement,
 }
 
-/// Local regressions of the surface that a cloud samples, d ≥ 2: over the points, and where they have noise
-/// over means of more and more of them.
+/// Local regressions of the surface that a cloud samples, d ≥ 2. They run over the points and, if the points
+/// have noise, also over means of increasingly many points.
 pub struct Patches {
     finest: Level,
     /// Levels of means, ascending by their points.
@@ -161,7 +163,8 @@ impl Patches {
         }
     }
 
-    /// Returns the most points of which regressions see the mean, 1 where they see the points themselves.
+    /// Returns the largest number of points per mean over all levels, or 1 if points are regressed without
+    /// averaging.
     pub fn points_per_mean(&self) -> usize {
         self.coarser.last().map_or(1, |coarsest| coarsest.level.support.points_per_mean())
     }

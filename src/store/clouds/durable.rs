@@ -54,7 +54,7 @@ pub enum StoreOutcome {
 
 /// Outcome of a look-up in memory, after a check with the store if one was due.
 pub enum CloudLookup {
-    LocalJob(Arc<RegisteredCloud>),
+    InMemory(Arc<RegisteredCloud>),
     /// The cloud was in memory but is no longer in the store.
     Gone,
     Unknown,
@@ -129,13 +129,13 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     ) -> CloudLookup {
         let Some(cloud) = self.get(holder.owner, id) else { return CloudLookup::Unknown };
         if cloud.is_trusted(trust) {
-            return CloudLookup::LocalJob(cloud);
+            return CloudLookup::InMemory(cloud);
         }
         let _turn = self.turns.take((holder.owner, id)).await;
         // Other tasks may have asked about it, or changed it, before this turn.
         let Some(cloud) = self.get(holder.owner, id) else { return CloudLookup::Unknown };
         if cloud.is_trusted(trust) || is_still_stored(objects, holder, &cloud).await {
-            return CloudLookup::LocalJob(cloud);
+            return CloudLookup::InMemory(cloud);
         }
         self.clouds.remove(holder.owner, &id);
         CloudLookup::Gone
@@ -203,7 +203,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         Ok(was_stored || was_unstored)
     }
 
-    /// Drops a cloud from memory that was not written, because it could not be read again.
+    /// Drops from memory a cloud that was not written because it could never be read back.
     pub fn drop_unreadable(&self, owner: Owner, cloud: &Arc<RegisteredCloud>) {
         if self.has(owner, cloud) {
             self.clouds.remove(owner, &cloud.id);

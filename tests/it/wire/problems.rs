@@ -125,7 +125,7 @@ async fn a_member_of_one_route_is_pointed_to_when_null_or_wrong() {
         ("/v1/surface-gradient", &["values", "surface"]),
         ("/v1/surface-gradient/matrix", &["surface"]),
         ("/v1/laplace-beltrami", &["values", "surface"]),
-        ("/v1/laplace-beltrami/matrix", &["surface", "format"]),
+        ("/v1/laplace-beltrami/matrix", &["surface", "solver"]),
     ] {
         let route = ROUTES.iter().find(|route| route.path == path).unwrap();
         for name in names {

@@ -1,8 +1,8 @@
 //! Normals that the points around them do not confirm.
 //!
 //! A smooth kernel with a small α follows the noise and the edges of a scan. Quadrics through a few points
-//! see some of it. Where they do not plainly agree, the local regression decides, because it estimates how
-//! far off it may be itself.
+//! reveal some of these errors. Where normal and quadric do not clearly agree, the local regression decides,
+//! because it also estimates its own error.
 
 use super::SignatureSurface;
 use crate::error::Result;

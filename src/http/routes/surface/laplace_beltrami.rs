@@ -1,9 +1,6 @@
 //! `POST /v1/laplace-beltrami`: the operator on values, as a dense matrix (`/matrix`) and as a sparse one
 //! (`/sparse-matrix`).
 
-use serde::Deserialize;
-use utoipa::ToSchema;
-
 use super::operator::{
     AppliedAnswer, AppliedWork, MatrixAnswer, MatrixWork, OperatorParts, SparseAnswer, StencilWork,
 };
@@ -41,15 +38,6 @@ request! {
     }
 }
 
-/// The layout of a matrix.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum MatrixFormat {
-    /// Every entry, row by row.
-    #[default]
-    Dense,
-}
-
 request! {
     /// A cloud of nodes on a surface, and queries for the rows of its Laplace–Beltrami matrix.
     pub struct LaplaceBeltramiMatrixRequest with surface taking hyperparameters {
@@ -63,10 +51,6 @@ request! {
         ///
         /// With a constant mean, the matrix maps constants to exactly 0.
         pub mean: Option<MeanChoice>,
-        /// Deprecated: matrices of this path are dense. For sparse ones, use
-        /// `/v1/laplace-beltrami/sparse-matrix`.
-        #[schema(deprecated)]
-        pub format: Option<MatrixFormat>,
     }
 }
 
@@ -150,7 +134,6 @@ impl Operation for LaplaceBeltramiMatrixRequest {
     const FORMATS: &[Format] = &[Format::Json, Format::Safetensors, Format::Npy];
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<MatrixWork>, Problem> {
-        let MatrixFormat::Dense = self.format.unwrap_or_default();
         let fit = Fit { mean: self.mean, ..self.take_fit() };
         MatrixWork::plan(planner, OPERATOR, fit, self.surface, self.queries)
     }

@@ -56,7 +56,7 @@ pub async fn find_cloud(
 ) -> Result<Option<Arc<RegisteredCloud>>, Problem> {
     let Some(Durable { objects, .. }) = &app.durable else { return Ok(app.clouds.get(owner, id)) };
     match app.clouds.recall(objects, &holder_of(app, owner), id, TRUST).await {
-        CloudLookup::LocalJob(cloud) => return Ok(Some(cloud)),
+        CloudLookup::InMemory(cloud) => return Ok(Some(cloud)),
         CloudLookup::Gone => {
             forget_results(app, owner, id);
             return Ok(None);

@@ -141,8 +141,8 @@ impl<'a> Planner<'a> {
         Ok(PlannedSurface { on, choice })
     }
 
-    /// Returns where local regressions have their hyperparameters from, if the client says so, and the member
-    /// of the request that says it.
+    /// Returns the source of the hyperparameters of local regressions if the request specifies one, with the
+    /// name of the member that specifies it.
     fn learning(
         &self,
         options: &mut FitOptions,
@@ -263,8 +263,8 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Checks the fits for a matrix on values that are not given: of these values, and of the surface under
-    /// them.
+    /// Checks the two fits behind an operator matrix: that of the values, which are not given, and that of
+    /// the surface under them.
     ///
     /// Fields that `surface` leaves out are those of the request.
     ///

@@ -94,7 +94,7 @@ impl Process {
 
     async fn get(&self) -> Answer {
         match self.clouds.recall(&self.objects, &holder(), id(), Duration::ZERO).await {
-            CloudLookup::LocalJob(_) => return Answer::Found(true),
+            CloudLookup::InMemory(_) => return Answer::Found(true),
             CloudLookup::Gone => return Answer::Found(false),
             CloudLookup::Unknown => {}
         }

@@ -124,7 +124,7 @@ impl Grid {
         Self { spacing, columns: Some(scales), ..Self::of(values) }
     }
 
-    /// Returns the kernel and noise for values that do not decide.
+    /// Returns the kernel and noise for values that do not determine them.
     pub(super) fn undecided(&self, values: &Values<'_>) -> LearnedModel {
         let observed = &values.observed;
         let family = FAMILIES[ROUGHEST];

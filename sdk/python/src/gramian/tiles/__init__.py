@@ -1,1 +1,1 @@
-"""What clouds in tiles need of the service: several replicas, and operations of their own."""
+"""Access to the service for tiled clouds: several replicas, and operations that only tiles need."""

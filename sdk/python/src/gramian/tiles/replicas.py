@@ -47,8 +47,7 @@ class Replicas:
     def ask(self, first: int, call: Callable[[Client], T]) -> T:
         """Returns what `call` makes of a replica: of number `first`, or of those after it where one does not answer.
 
-        `call` may be begun several times, so it is to be made of operations that may be repeated, as all of the
-        service are.
+        `call` may be started several times, so all its operations must be safe to repeat, as those of the service are.
 
         Parameters
         ----------
