@@ -54,7 +54,6 @@ if TYPE_CHECKING:
     from .level_set_request import LevelSetRequest
     from .level_set_response import LevelSetResponse
     from .link import Link
-    from .matrix_format import MatrixFormat
     from .mean_choice import MeanChoice
     from .means_level import MeansLevel
     from .mesh_bounds import MeshBounds
@@ -156,7 +155,6 @@ __all__ = (
     "LevelSetRequest",
     "LevelSetResponse",
     "Link",
-    "MatrixFormat",
     "MeanChoice",
     "MeansLevel",
     "MeshBounds",
@@ -256,7 +254,6 @@ if not TYPE_CHECKING:
         "LevelSetRequest": ".level_set_request",
         "LevelSetResponse": ".level_set_response",
         "Link": ".link",
-        "MatrixFormat": ".matrix_format",
         "MeanChoice": ".mean_choice",
         "MeansLevel": ".means_level",
         "MeshBounds": ".mesh_bounds",
