@@ -140,14 +140,14 @@ const LEAST_VALUES: usize = 8;
 /// use gramian_numerics::observer::Unobserved;
 /// use gramian_numerics::points::cloud::Cloud;
 /// use gramian_numerics::points::sampling::Sampling;
-/// use gramian_numerics::regression::selection::{Noise, Observed, learn};
+/// use gramian_numerics::regression::selection::{Noise, ObservedCloud, learn};
 /// use gramian_numerics::regression::solver::trend::Mean;
 ///
 /// let cloud = Cloud::new((0..100).map(|i| f64::from(i) / 10.0).collect(), 1)?;
 /// let values: Vec<f64> = cloud.points().map(|x| x[0].sin()).collect();
 /// let sampling = Sampling::of(&cloud, &Unobserved)?;
 /// let (noise, mean) = (Noise::Unknown, Mean::Constant);
-/// let observed = Observed { cloud: &cloud, sampling: &sampling, values: &values, noise, mean };
+/// let observed = ObservedCloud { cloud: &cloud, sampling: &sampling, values: &values, noise, mean };
 /// let learned = learn(observed, &Unobserved)?;
 /// assert!(learned.length_scale > 0.5 && learned.ratio < 1e-3); // a wave that is nearly without noise
 /// # Ok::<(), gramian_numerics::error::NumericsError>(())
