@@ -17,7 +17,7 @@ use sides::tally::SideTally;
 const MAX_DENSE: usize = 3000;
 
 const HEADER: &str = "\
-| cloud | surface | points | flipped | without a flag | of what has none | flagged | for its side | off by 30° without a flag |
+| cloud | solver | points | flipped | without a flag | of what has none | flagged | for its side | off by 30° without a flag |
 |---|---|---|---|---|---|---|---|---|";
 
 fn main() {
