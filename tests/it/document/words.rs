@@ -72,7 +72,7 @@ const TABLES: [(&str, &str, &str); 4] = [
 fn table(page: &str, head: &str) -> Vec<(String, String)> {
     let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(page)).unwrap();
     let rows = text.lines().skip_while(|line| !line.starts_with(&format!("| {head} |"))).skip(2);
-    let parts = rows.map_while(|row| row.strip_prefix("| `")?.split_once("` |"));
+    let parts = rows.map_while(|row| row.strip_prefix("| `")?.split_once('`'));
     parts.map(|(name, rest)| (name.to_owned(), rest.to_owned())).collect()
 }
 
@@ -101,7 +101,7 @@ fn media_types(document: &Value, pointer: &str) -> BTreeSet<String> {
 fn the_table_of_formats_lists_those_of_bodies_and_answers() {
     let (document, rows) = (document(), table("docs/api.md", "media type"));
     let listed: BTreeSet<String> = rows.iter().map(|(name, _)| name.clone()).collect();
-    let is_read = |(_, rest): &&(String, String)| !rest.starts_with(" none |");
+    let is_read = |(_, rest): &&(String, String)| !rest.starts_with(" | none |");
     let of_bodies: BTreeSet<String> = rows.iter().filter(is_read).map(|(name, _)| name.clone()).collect();
     assert_eq!(of_bodies, media_types(&document, "/requestBody/content"));
     assert_eq!(listed, media_types(&document, "/responses/200/content"));
