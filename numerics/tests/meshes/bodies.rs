@@ -9,7 +9,7 @@ use gramian_numerics::surface::Surface;
 
 use crate::common::clouds::fibonacci_sphere;
 use crate::common::random::Random;
-use crate::support::{OPTIONS, local, meshed, volume};
+use crate::support::{OPTIONS, local, meshed, spacing_of, volume};
 
 #[derive(Debug, Clone, Copy)]
 enum Body {
@@ -177,4 +177,24 @@ fn sharp_edges_have_no_tunnels() {
     };
     let n_whole = (0..16).filter(|&seed| is_whole(seed)).count();
     assert!(n_whole >= 15, "{n_whole} of 16 cones are without a handle");
+}
+
+/// A lens of three spacings in its middle, with noise of 0.2 spacings. Most of these had handles beside its
+/// rim.
+#[test]
+fn thin_noisy_lenses_have_no_tunnels() {
+    for seed in 0..4 {
+        let mut random = Random(seed);
+        let exact: Vec<f64> = (0..4000).flat_map(|_| lens_point(&mut random)).collect();
+        let noise = 0.2 * spacing_of(&Cloud::new(exact.clone(), 3).unwrap());
+        let points = exact.iter().map(|x| x + noise * random.normal()).collect();
+        let (found, _) = meshed(&local(Cloud::new(points, 3).unwrap()), &OPTIONS);
+        assert_eq!(topology_of(&found), [2], "seed {seed}");
+    }
+}
+
+/// A point of an oblate ellipsoid with half axes 1, 1 and 0.1.
+fn lens_point(random: &mut Random) -> [f64; 3] {
+    let [x, y, z] = random.on_sphere();
+    [x, y, 0.1 * z]
 }
