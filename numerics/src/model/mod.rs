@@ -25,7 +25,7 @@ use crate::regression::function::local_kriging::LocalKriging;
 use crate::regression::solver::trend::Mean;
 use crate::regression::solver::{EarlierSolutions, Method, RightHandSide, Solution, Solver};
 use crate::surface::Surface;
-use crate::surface::local::{Given, LocalSurface};
+use crate::surface::local::{LocalInputs, LocalSurface};
 use crate::surface::signature::{Signature, SignatureSurface};
 pub use making::Making;
 pub use process::ScaledProcess;
@@ -47,7 +47,7 @@ pub enum Model {
 pub struct SurfaceMaking<'a> {
     pub cloud: &'a Arc<Cloud>,
     pub sampling: Arc<Sampling>,
-    pub given: Given<'a>,
+    pub given: LocalInputs<'a>,
     /// What is known of the weights of the signature function, which interpolates the constant 1.
     pub signature: EarlierSolutions,
 }

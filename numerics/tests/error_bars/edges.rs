@@ -9,7 +9,7 @@ use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::flags::FlagReason;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, Orientation};
-use gramian_numerics::surface::local::{Given, LocalSurface};
+use gramian_numerics::surface::local::{LocalInputs, LocalSurface};
 
 use crate::common::random::Random;
 
@@ -193,7 +193,7 @@ impl Part {
 
 fn normals(cloud: &Arc<Cloud>, orientation: Orientation) -> Geometry {
     let sampling = Arc::new(Sampling::of(cloud, &Unobserved).unwrap());
-    let local = LocalSurface::of(cloud.clone(), sampling, Given::default(), &Unobserved).unwrap();
+    let local = LocalSurface::of(cloud.clone(), sampling, LocalInputs::default(), &Unobserved).unwrap();
     let request = GeometryRequest {
         orientation,
         checks_curvatures: false,

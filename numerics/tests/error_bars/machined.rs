@@ -7,7 +7,7 @@ use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
-use gramian_numerics::surface::local::{Given, LocalSurface};
+use gramian_numerics::surface::local::{LocalInputs, LocalSurface};
 
 use crate::common::random::Random;
 
@@ -54,7 +54,7 @@ fn curvatures(points: impl Iterator<Item = [f64; 3]>, noise: f64, random: &mut R
     let coordinates = points.flatten().map(|x| x + noise * random.normal()).collect();
     let cloud = Arc::new(Cloud::new(coordinates, 3).unwrap());
     let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
-    let local = LocalSurface::of(cloud.clone(), sampling, Given::default(), &Unobserved).unwrap();
+    let local = LocalSurface::of(cloud.clone(), sampling, LocalInputs::default(), &Unobserved).unwrap();
     let request = GeometryRequest { has_deviations: true, ..GeometryRequest::CURVATURES };
     Geometry::of(&Surface::from(local), &cloud, &request, &Unobserved).unwrap()
 }

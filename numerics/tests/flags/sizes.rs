@@ -9,7 +9,7 @@ use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::regression::function::interpolant::Interpolant;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
-use gramian_numerics::surface::local::{Given, LocalSurface};
+use gramian_numerics::surface::local::{LocalInputs, LocalSurface};
 
 use super::common::clouds::{fibonacci_sphere, noisy, random_torus};
 use super::common::fits::{default_kernel_and_alpha, factorize};
@@ -23,7 +23,7 @@ fn dense(cloud: &Arc<Cloud>) -> Surface {
 
 fn local(cloud: &Arc<Cloud>) -> Surface {
     let sampling = Arc::new(Sampling::of(cloud, &Unobserved).unwrap());
-    LocalSurface::of(cloud.clone(), sampling, Given::default(), &Unobserved).unwrap().into()
+    LocalSurface::of(cloud.clone(), sampling, LocalInputs::default(), &Unobserved).unwrap().into()
 }
 
 fn geometry(surface: &Surface, cloud: &Cloud, has_deviations: bool) -> Geometry {

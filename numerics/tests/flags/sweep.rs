@@ -12,7 +12,7 @@ use gramian_numerics::regression::function::interpolant::Interpolant;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::flags::FlagReason;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
-use gramian_numerics::surface::local::{Given, LocalSurface};
+use gramian_numerics::surface::local::{LocalInputs, LocalSurface};
 use gramian_numerics::surface::served::ServedBy;
 
 use super::common::clouds::cloud;
@@ -119,7 +119,7 @@ impl Case {
         let before = surface(&factorize(&noisy, kernel, alpha));
         let before = self.tally(&before, &noisy, &points, &GeometryRequest::CURVATURES);
         let sampling = Arc::new(Sampling::of(&noisy, &Unobserved).unwrap());
-        let local = LocalSurface::of(noisy.clone(), sampling, Given::default(), &Unobserved).unwrap();
+        let local = LocalSurface::of(noisy.clone(), sampling, LocalInputs::default(), &Unobserved).unwrap();
         let request = GeometryRequest { has_deviations: true, ..GeometryRequest::CURVATURES };
         [before, self.tally(&local.into(), &noisy, &points, &request)]
     }

@@ -9,7 +9,7 @@ use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::surface::Surface;
-use gramian_numerics::surface::local::{Given, LocalSurface};
+use gramian_numerics::surface::local::{LocalInputs, LocalSurface};
 
 pub const OPTIONS: MeshOptions =
     MeshOptions { step: None, bounds: None, quality: Quality::Regular, is_open: false, max_nodes: 2_000_000 };
@@ -18,7 +18,7 @@ pub const OPTIONS: MeshOptions =
 pub fn local(cloud: Cloud) -> Surface {
     let cloud = Arc::new(cloud);
     let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
-    LocalSurface::of(cloud, sampling, Given::default(), &Unobserved).unwrap().into()
+    LocalSurface::of(cloud, sampling, LocalInputs::default(), &Unobserved).unwrap().into()
 }
 
 pub fn meshed(surface: &Surface, options: &MeshOptions) -> (LevelSet, Closedness) {

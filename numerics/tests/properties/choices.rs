@@ -12,7 +12,7 @@ use gramian_numerics::regression::selection::{LearnedModel, Noise, ObservedCloud
 use gramian_numerics::regression::solver::trend::Mean;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
-use gramian_numerics::surface::local::{Given, Learning, LocalSurface};
+use gramian_numerics::surface::local::{Learning, LocalInputs, LocalSurface};
 
 use crate::common::fits;
 use crate::common::random::Random;
@@ -105,7 +105,7 @@ fn parts_with_the_hyperparameters_of_the_whole_have_its_surface() {
     };
     let surface = |cloud: &Arc<Cloud>, learning: Option<&Learning>| {
         let sampling = Arc::new(Sampling::of(cloud, &Unobserved).unwrap());
-        let given = Given { normals: None, learning };
+        let given = LocalInputs { normals: None, learning };
         LocalSurface::of(cloud.clone(), sampling, given, &Unobserved).unwrap()
     };
     let of_whole = surface(&whole, None);
@@ -133,7 +133,7 @@ fn queries_that_are_points_have_the_deviations_of_points() {
     let local = {
         let cloud = Arc::new(noisy(3000, 3));
         let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
-        let given = Given { normals: None, learning: None };
+        let given = LocalInputs { normals: None, learning: None };
         Surface::Local(Box::new(LocalSurface::of(cloud, sampling, given, &Unobserved).unwrap()))
     };
     let request = GeometryRequest { has_deviations: true, ..GeometryRequest::CURVATURES };

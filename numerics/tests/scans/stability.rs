@@ -9,14 +9,15 @@ use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
-use gramian_numerics::surface::local::{Given, LocalSurface};
+use gramian_numerics::surface::local::{LocalInputs, LocalSurface};
 
 use crate::bunny::bunny;
 
 fn stencils(cloud: &Cloud) -> Stencils {
     let cloud = Arc::new(cloud.clone());
     let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
-    let surface = LocalSurface::of(cloud.clone(), sampling.clone(), Given::default(), &Unobserved).unwrap();
+    let surface =
+        LocalSurface::of(cloud.clone(), sampling.clone(), LocalInputs::default(), &Unobserved).unwrap();
     let geometry =
         Geometry::of(&Surface::from(surface), &cloud, &GeometryRequest::CURVATURES, &Unobserved).unwrap();
     Operator::LaplaceBeltrami.stencils(&geometry, &cloud, sampling.neighbours(), &cloud, &Unobserved).unwrap()

@@ -17,7 +17,7 @@ use gramian_numerics::regression::solver::trend::Mean;
 use gramian_numerics::regression::sums::regularization::Regularization;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
-use gramian_numerics::surface::local::{Given, LocalSurface};
+use gramian_numerics::surface::local::{LocalInputs, LocalSurface};
 
 use crate::common::random::Random;
 use crate::fields::Field;
@@ -75,7 +75,7 @@ impl Case {
         let system = System::new(cloud.clone(), kernel, alpha).unwrap();
         let moving = LocalKriging::new(system, sampling.clone(), &Unobserved).unwrap();
         let surface =
-            Surface::from(LocalSurface::of(cloud, sampling, Given::default(), &Unobserved).unwrap());
+            Surface::from(LocalSurface::of(cloud, sampling, LocalInputs::default(), &Unobserved).unwrap());
         let request = GeometryRequest {
             model: SurfaceModel::Regression,
             has_deviations: true,

@@ -18,7 +18,7 @@ use gramian_numerics::regression::sums::jets::JetOrder;
 use gramian_numerics::regression::sums::regularization::Regularization;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
-use gramian_numerics::surface::local::{Given, LocalSurface};
+use gramian_numerics::surface::local::{LocalInputs, LocalSurface};
 
 use crate::common::random::Random;
 use crate::fields::Field;
@@ -114,7 +114,7 @@ impl Case {
         row.add(1, &jets.gradients(), &bars.gradients, truth.iter().flat_map(|t| t.gradient));
         row.add(2, &jets.hessians(), &bars.hessians, truth.iter().flat_map(|t| t.hessian.concat()));
 
-        let local = LocalSurface::of(cloud.clone(), sampling, Given::default(), &Unobserved).unwrap();
+        let local = LocalSurface::of(cloud.clone(), sampling, LocalInputs::default(), &Unobserved).unwrap();
         let surface = Surface::from(local);
         let request = GeometryRequest {
             model: SurfaceModel::Regression,

@@ -19,7 +19,7 @@ use gramian_numerics::model::{Making, Model, SurfaceMaking};
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::regression::solver::Workspace;
 use gramian_numerics::surface::Surface;
-use gramian_numerics::surface::local::Given;
+use gramian_numerics::surface::local::LocalInputs;
 
 /// Bytes that a request takes whatever its size: small vectors, headers, and the text of its diagnostics.
 const LEAST_BYTES: usize = 16 << 10;
@@ -323,7 +323,7 @@ fn make_surface(
                 None => Arc::new(Sampling::of(&plan.fitted, observer)?),
             };
             let normals = plan.fitted_normals();
-            let given = Given { normals: normals.as_deref(), learning: plan.recipe.learning() };
+            let given = LocalInputs { normals: normals.as_deref(), learning: plan.recipe.learning() };
             let ones = ValuesKey::of(&vec![1.0; plan.stored.cloud.n_points()]);
             let signature = shared.prepared.known(plan.key, ones);
             let is_new = signature.these.is_none();

@@ -7,7 +7,7 @@ use crate::observer::Unobserved;
 use crate::points::sampling::Sampling;
 use crate::surface::Surface;
 use crate::surface::geometry::GeometryRequest;
-use crate::surface::local::{Given, LocalSurface};
+use crate::surface::local::{LocalInputs, LocalSurface};
 use crate::testing::{Random, circle, fibonacci_sphere};
 
 /// The operators over the points of a cloud.
@@ -19,7 +19,8 @@ pub(super) struct Operators {
 pub(super) fn operators(cloud: &Cloud) -> Operators {
     let cloud = Arc::new(cloud.clone());
     let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
-    let surface = LocalSurface::of(cloud.clone(), sampling.clone(), Given::default(), &Unobserved).unwrap();
+    let surface =
+        LocalSurface::of(cloud.clone(), sampling.clone(), LocalInputs::default(), &Unobserved).unwrap();
     let surface = Surface::from(surface);
     let geometry = Geometry::of(&surface, &cloud, &GeometryRequest::CURVATURES, &Unobserved).unwrap();
     let tree = sampling.neighbours();

@@ -58,7 +58,7 @@ pub enum Learning {
 
 /// Optional knowledge of a surface beside its points.
 #[derive(Clone, Copy, Default)]
-pub struct Given<'a> {
+pub struct LocalInputs<'a> {
     /// Normals of the points, `[n, d]`, of any length but 0. They determine the outward side.
     pub normals: Option<&'a Cloud>,
     pub learning: Option<&'a Learning>,
@@ -74,14 +74,14 @@ pub struct Given<'a> {
 /// use gramian_numerics::points::sampling::Sampling;
 /// use gramian_numerics::surface::Surface;
 /// use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
-/// use gramian_numerics::surface::local::{Given, LocalSurface};
+/// use gramian_numerics::surface::local::{LocalInputs, LocalSurface};
 ///
 /// // 500 points of a circle of radius 2, for which nothing is chosen: no kernel, no noise.
 /// let angles = (0..500).map(|i| std::f64::consts::TAU * f64::from(i) / 500.0);
 /// let points = angles.flat_map(|t| [2.0 * t.cos(), 2.0 * t.sin()]).collect();
 /// let cloud = Arc::new(Cloud::new(points, 2)?);
 /// let sampling = Arc::new(Sampling::of(&cloud, &Unobserved)?);
-/// let given = Given { normals: None, learning: None };
+/// let given = LocalInputs { normals: None, learning: None };
 /// let surface: Surface = LocalSurface::of(cloud.clone(), sampling, given, &Unobserved)?.into();
 /// let geometry = Geometry::of(&surface, &cloud, &GeometryRequest::CURVATURES, &Unobserved)?;
 /// assert!(geometry.curvatures(&Unobserved)?.mean.iter().all(|mean| (mean - 0.5).abs() < 1e-3));
@@ -113,7 +113,7 @@ impl LocalSurface {
     pub fn of(
         cloud: Arc<Cloud>,
         sampling: Arc<Sampling>,
-        given: Given<'_>,
+        given: LocalInputs<'_>,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
         observer.enter(Stage::Evaluate);
@@ -323,8 +323,9 @@ mod tests {
     fn geometry(cloud: Cloud) -> Geometry {
         let cloud = Arc::new(cloud);
         let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
-        let surface =
-            Surface::from(LocalSurface::of(cloud.clone(), sampling, Given::default(), &Unobserved).unwrap());
+        let surface = Surface::from(
+            LocalSurface::of(cloud.clone(), sampling, LocalInputs::default(), &Unobserved).unwrap(),
+        );
         let request = GeometryRequest { has_deviations: true, ..GeometryRequest::CURVATURES };
         Geometry::of(&surface, &cloud, &request, &Unobserved).unwrap()
     }

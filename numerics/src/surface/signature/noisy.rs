@@ -7,7 +7,7 @@ use crate::observer::Observer;
 use crate::orientation::OrientedNormals;
 use crate::points::cloud::Cloud;
 use crate::points::sampling::Sampling;
-use crate::surface::local::{Given, LocalSurface};
+use crate::surface::local::{LocalInputs, LocalSurface};
 
 /// Orients the points of a plane curve by local regressions, if their noise is such that the gradients of the
 /// signature function and the steps between neighbours do not tell the sides. `None` for other clouds.
@@ -26,6 +26,6 @@ pub(super) fn oriented_curve(
     if cloud.dimension() != 2 {
         return Ok(None);
     }
-    let local = LocalSurface::of(cloud.clone(), sampling.clone(), Given::default(), observer)?;
+    let local = LocalSurface::of(cloud.clone(), sampling.clone(), LocalInputs::default(), observer)?;
     Ok(local.is_noisy().then(|| local.oriented()))
 }

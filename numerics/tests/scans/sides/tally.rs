@@ -8,7 +8,7 @@ use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::flags::{Flag, FlagReason};
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
-use gramian_numerics::surface::local::{Given, LocalSurface};
+use gramian_numerics::surface::local::{LocalInputs, LocalSurface};
 
 use super::clouds::OrientedCloud;
 use crate::common::fits::{default_kernel_and_alpha, factorize, surface};
@@ -42,7 +42,10 @@ impl SideTally {
     pub fn local(sided: &OrientedCloud) -> Self {
         let cloud = Arc::new(sided.cloud.clone());
         let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
-        Self::of(&LocalSurface::of(cloud, sampling, Given::default(), &Unobserved).unwrap().into(), sided)
+        Self::of(
+            &LocalSurface::of(cloud, sampling, LocalInputs::default(), &Unobserved).unwrap().into(),
+            sided,
+        )
     }
 
     fn of(surface: &Surface, sided: &OrientedCloud) -> Self {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
-use gramian_numerics::surface::local::{Given, LocalSurface};
+use gramian_numerics::surface::local::{LocalInputs, LocalSurface};
 
 use super::cases::{
     Case, box_faces, cone, curves, folded_curve, folded_sheet, lens, nested_spheres, noisy_curves, plate,
@@ -151,7 +151,7 @@ fn folded_sheets_have_right_sides() {
 fn is_open(sided: &OrientedCloud) -> bool {
     let cloud = Arc::new(sided.cloud.clone());
     let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
-    LocalSurface::of(cloud, sampling, Given::default(), &Unobserved).unwrap().orientation().is_open
+    LocalSurface::of(cloud, sampling, LocalInputs::default(), &Unobserved).unwrap().orientation().is_open
 }
 
 /// Each face of a box ends at its edges, but only a box without a lid has a rim. With a few hundred points,
