@@ -15,13 +15,13 @@ use crate::machine::small::zeros;
 use crate::machine::vector::norm;
 use crate::observer::Observer;
 use crate::orientation::WindingNumbers;
-use crate::points::cloud::Cloud;
 use crate::points::neighbours::Neighbour;
 use crate::points::sampling::Sampling;
 use crate::regression::function::interpolant::Interpolant;
 use crate::regression::sums::jets::{JetOrder, Jets};
 use crate::surface::Surface;
 use crate::surface::curvature::principal_curvatures;
+use crate::surface::local::smoothed::SampledCloud;
 
 /// Part of the radius of a cloud, and spacings, by which the default box exceeds that of its points.
 const MARGIN_OF_RADIUS: f64 = 0.2;
@@ -124,13 +124,6 @@ const MAX_BETWEEN: f64 = 32.0;
 /// Most bytes of the seeds of a point of a level: its foot, and the places between it and its nearest points.
 pub(super) const fn seed_bytes(dimension: usize) -> usize {
     (N_NEAREST * (MAX_BETWEEN as usize + 1) + 1) * dimension * size_of::<f64>()
-}
-
-/// A cloud with its sampling.
-#[derive(Clone, Copy)]
-struct SampledCloud<'a> {
-    cloud: &'a Cloud,
-    sampling: &'a Sampling,
 }
 
 impl<'a> SampledCloud<'a> {

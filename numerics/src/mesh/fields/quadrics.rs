@@ -84,6 +84,7 @@ impl Quadrics {
             let bend = quadric.bend(&delta);
             height += weight * (quadric.height + dot(&quadric.normal, &delta) + 0.5 * dot(&bend, &delta));
             let slope: Vector = std::array::from_fn(|axis| quadric.normal[axis] + bend[axis]);
+            // At least 1 long, since shape operators map to the tangent plane.
             let per_length = squared_length(&slope).sqrt().recip();
             for axis in 0..3 {
                 gradient[axis] += weight * slope[axis];

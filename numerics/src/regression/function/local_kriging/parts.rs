@@ -62,7 +62,7 @@ impl Parts {
         self.n_solved() + 3 + if self.n_functionals > 0 { self.n_derivatives } else { 0 }
     }
 
-    /// Numbers per query in dimension d, laid out as [`RowOffsets`] says.
+    /// Numbers per query in dimension d, in the order of [`RowOffsets`].
     pub(super) const fn n_numbers(&self, dimension: usize) -> usize {
         RowOffsets::of(dimension).of_functions(self) + self.n_functions * (1 + self.n_quantities())
     }
