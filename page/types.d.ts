@@ -51,22 +51,37 @@ export interface Quantity {
   id: string;
   title: string;
   unit: string;
-  /** Whether 0 is in the middle of the colours. */
+  /** Whether 0 is in the middle of the colours, where there are values on both sides of it. */
   isSigned: boolean;
   values: ArrayLike<number>;
   deviations?: ArrayLike<number>;
+  /** Red, green and blue from 0 to 255, of points that have colours of their own. */
+  channels?: ArrayLike<number>[];
 }
 
-/** How numbers become colours. */
-export interface ColourRange {
+/** Places of values on a scale of colours, and the map that has the colours. */
+export interface Scale {
   low: number;
+  /** The value of the middle colour of a diverging map. A sequential map has none. */
+  middle?: number;
   high: number;
+  isLogarithmic: boolean;
+  map: string;
+}
+
+/** How numbers become colours, and which points are hidden. */
+export interface ColourRange extends Scale {
   /** The deviation at which a colour is grey. 0: no colour is. */
   full: number;
   /** The deviation beyond which a point is hidden. */
   hide: number;
-  isSigned: boolean;
   hasLines?: boolean;
+}
+
+/** A box of which the picture shows the inside, in coordinates of the cloud. */
+export interface Box {
+  low: number[];
+  high: number[];
 }
 
 /** Queries that are marked for one reason, and the colour of the marks. */
@@ -136,6 +151,11 @@ export interface Elements {
   scene: HTMLCanvasElement;
   scale: HTMLElement;
   tip: HTMLElement;
+  labels: HTMLElement;
+  axes: HTMLCanvasElement;
+  measure: HTMLButtonElement;
+  measured: HTMLElement;
+  unitOfLength: HTMLElement;
   progress: HTMLElement;
   cancel: HTMLButtonElement;
   refusal: HTMLElement;
