@@ -46,6 +46,21 @@ export interface Diagnostics {
   warnings?: { detail: string }[];
 }
 
+/** Numbers of all points under a name, as files have them. */
+export interface Column {
+  name: string;
+  values: ArrayLike<number>;
+}
+
+/** Where a snippet has its points from: itself, or a file in the folder where it runs. */
+export interface Source {
+  inline?: { points: number[][]; normals?: number[][] };
+  file?: string;
+  mediaType?: string;
+  /** Whether the page makes that file, which the user has not. */
+  isMade?: boolean;
+}
+
 /** Numbers that points can be coloured by. */
 export interface Quantity {
   id: string;
@@ -167,6 +182,7 @@ export interface Elements {
   pinned: HTMLElement;
   link: HTMLButtonElement;
   languages: HTMLElement;
+  needs: HTMLElement;
   code: HTMLElement;
   copy: HTMLButtonElement;
   diagnostics: HTMLElement;

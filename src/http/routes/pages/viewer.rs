@@ -32,6 +32,7 @@ static FILES: &[File] = files!["page":
     "control/settings.js" SCRIPT,
     "data/dragon.bin" NUMBERS,
     "model/examples.js" SCRIPT,
+    "model/export.js" SCRIPT,
     "model/files.js" SCRIPT,
     "model/operations.js" SCRIPT,
     "model/section.js" SCRIPT,
