@@ -39,8 +39,9 @@ export async function ask() {
   const name = `${settings.operation} ${JSON.stringify(request)}`;
   if (kept.has(name)) {
     at("progress").hidden = true;
-    showAnswer(kept.get(name), { isNew: settings.operation !== page.shown });
-    document.body.dataset.state = "settled";
+    document.body.dataset.state = "asking";
+    await showAnswer(kept.get(name), { isNew: settings.operation !== page.shown });
+    if (page.asking === asking) document.body.dataset.state = "settled";
     return;
   }
   document.body.dataset.state = "asking";
@@ -49,7 +50,7 @@ export async function ask() {
     const answer = await withCloud(cloud, request, asking.signal);
     kept.set(name, answer);
     for (const oldest of [...kept.keys()].slice(0, -KEPT)) kept.delete(oldest);
-    if (page.asking === asking) showAnswer(answer, { isNew: settings.operation !== page.shown });
+    if (page.asking === asking) await showAnswer(answer, { isNew: settings.operation !== page.shown });
   } catch (error) {
     if (!asking.signal.aborted) refuse(error);
   } finally {

@@ -14,7 +14,7 @@ const BITS = 10;
 const SHIFTS = [0, 0.29];
 
 /** Spacings are held within these factors of their median, so that a stray point is no large dot. */
-const LEAST = 0.2;
+const LEAST = 0.05;
 const MOST = 6;
 
 /**
