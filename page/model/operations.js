@@ -117,7 +117,9 @@ function channelsOf(values) {
 function columnOf(tensor, at) {
   if (!tensor) return undefined;
   if (tensor.width === 1) return tensor.data;
-  return Float64Array.from({ length: tensor.rows }, (_, row) => tensor.data[row * tensor.width + at]);
+  const column = new Float64Array(tensor.rows);
+  for (let row = 0; row < tensor.rows; row++) column[row] = tensor.data[row * tensor.width + at];
+  return column;
 }
 
 function unitOf(name, d) {

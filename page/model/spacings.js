@@ -1,7 +1,7 @@
 // @ts-check
 // Spacings of points by place, for the sizes of their dots.
 
-import { inTurns, turn } from "./turns.js";
+import { inTurns } from "./turns.js";
 
 /** Neighbours whose distance tells the spacing. */
 const NEIGHBOURS = 6;
@@ -86,16 +86,20 @@ function spread(x) {
 /** Places of keys in ascending order: a radix sort, ten bits at a time. */
 async function sorted(keys) {
   const n = keys.length;
-  let order = Uint32Array.from({ length: n }, (_, at) => at);
-  let other = new Uint32Array(n);
+  let [order, other] = [new Uint32Array(n), new Uint32Array(n)];
+  for (let at = 0; at < n; at++) order[at] = at;
   for (let bit = 0; bit < 3 * BITS; bit += BITS) {
-    await turn();
     const begins = new Uint32Array(2 ** BITS + 1);
+    const [source, target] = [order, other];
     const digit = (at) => (keys[at] >>> bit) & (2 ** BITS - 1);
-    for (let at = 0; at < n; at++) begins[digit(at) + 1]++;
+    await inTurns(n, (from, to) => {
+      for (let at = from; at < to; at++) begins[digit(at) + 1]++;
+    });
     for (let value = 0; value < 2 ** BITS; value++) begins[value + 1] += begins[value];
-    for (const at of order) other[begins[digit(at)]++] = at;
-    [order, other] = [other, order];
+    await inTurns(n, (from, to) => {
+      for (let place = from; place < to; place++) target[begins[digit(source[place])]++] = source[place];
+    });
+    [order, other] = [target, source];
   }
   return order;
 }
