@@ -1,19 +1,22 @@
 // @ts-check
-// The picture of an answer: colours, marks and what is drawn beside the points.
+// The picture of an answer: its colours, and what is said of them.
 
-import { quantitiesOf, requestOf } from "../model/operations.js";
-import { pixelsOf, planeOf, valuesOn, WIDTH } from "../model/section.js";
-import { rangeOf, shown, sortedOf, SUPPORT } from "../view/colours.js";
+import { quantitiesOf } from "../model/operations.js";
+import { shown, SUPPORT } from "../view/colours.js";
 import { Histogram } from "../view/histogram.js";
 import { element, markedOf, showDiagnostics, showMarks, showSupport, summaryOf } from "../view/readout.js";
 import { at, fieldOf } from "./elements.js";
+import { CUT_SETTINGS, OVERLAY_SETTINGS, showCut, showExtras } from "./overlay.js";
 import { change, events, page, scene } from "./page.js";
-import { idOf, refuse } from "./registered.js";
+import { chosen, isPositive, rangeNow } from "./range.js";
 
-/** @import { Answer, Cloud, ColourRange, Quantity, Settings } from "../types.d.ts" */
+/** @import { Answer, ColourRange, Quantity, Settings } from "../types.d.ts" */
 
-/** Settings of what is drawn beside points and meshes. */
-const OVERLAY_SETTINGS = ["arrows", "directions", "section", "sectionAt"];
+/** Settings whose change leaves the numbers in the buffers as they are. */
+const RANGE_SETTINGS = ["range", "low", "high", "centre", "map", "hide", "suppress", "isolines"];
+
+/** The part of the points with a side beyond which those that look away are hidden. */
+const CLOSED = 0.5;
 
 export const histogram = new Histogram(at("histogram"), (low, high) => change({ range: "own", low, high }));
 
@@ -23,20 +26,21 @@ events.addEventListener("drawn", showScale);
  * @param {Answer} answer
  * @param {{ isNew: boolean }} options
  */
-export function showAnswer(answer, { isNew }) {
+export async function showAnswer(answer, { isNew }) {
   const { cloud } = page;
   if (!cloud) return;
+  const { vertices, cells, normals } = answer.tensors;
+  const before = scene.body;
+  const positions = vertices ?? cloud.points;
+  if (!(await scene.show({ positions, cells, normals, hidesAway: hidesAway(answer) }))) return;
   page.answer = answer;
   page.shown = page.settings.operation;
-  page.quantities = quantitiesOf(answer, cloud);
+  page.quantities = quantitiesOf(answer, cloud, page.settings.unit);
   page.reasons = markedOf(answer);
   page.reasonOf = new Map([...page.reasons].flatMap(([reason, { points }]) => points.map((point) => [point, reason])));
   page.hidden.clear();
   page.point = undefined;
-  const { vertices, cells, normals } = answer.tensors;
-  const before = scene.object;
-  scene.show({ positions: vertices ?? cloud.points, cells, normals, nearby: cloud.points.rows });
-  scene.project(page.settings.orthographic);
+  showView();
   if (isNew || !before) scene.fit();
   const names = page.quantities.map(({ id, title }) => new Option(title, id));
   fieldOf("quantity").replaceChildren(...names);
@@ -48,45 +52,77 @@ export function showAnswer(answer, { isNew }) {
   at("support").hidden = !answer.fields.support;
   showSupport(at("support"), answer);
   showDiagnostics(at("diagnostics"), answer);
-  showPicture();
+  await showPicture();
   showExtras();
-}
-
-/** @returns {Quantity | undefined} */
-export function chosen() {
-  return page.quantities.find(({ id }) => id === page.settings.quantity) ?? page.quantities[0];
+  events.dispatchEvent(new Event("answered"));
 }
 
 /**
- * The range of colours, and which points are hidden, from the settings.
+ * Whether points that look away are hidden: they are wanted to be, and have sides.
  *
- * @param {Quantity | undefined} quantity
- * @returns {ColourRange}
+ * @param {Answer} answer
  */
-export function rangeNow(quantity) {
+function hidesAway({ tensors, fields }) {
+  const hasSides = tensors.normals !== undefined && !tensors.vertices && (fields.closedness ?? 1) > CLOSED;
+  fieldOf("away").disabled = !hasSides;
+  fieldOf("away").title = hasSides ? "" : "These points have no outer side, or it is not known.";
+  return page.settings.away && hasSides;
+}
+
+/** Axes, projection, dots and light, from the settings. */
+function showView() {
   const { settings } = page;
-  const own = settings.range === "own" && settings.low < settings.high;
-  const [low, high] = own
-    ? [settings.low, settings.high]
-    : quantity
-      ? rangeOf(quantity, settings.range === "full")
-      : [0, 1];
-  const known = quantity?.deviations ? sortedOf(quantity.deviations) : [];
-  // Colours are grey where a deviation is half the range of colours.
-  const full = settings.suppress && known.length > 0 ? 0.5 * (high - low) : 0;
-  const hide = known.length > 0 && settings.hide < 1 ? known[Math.floor(settings.hide * (known.length - 1))] : Infinity;
-  return { low, high, full, hide, isSigned: quantity?.isSigned ?? false, hasLines: settings.isolines };
+  scene.raise(settings.up === "z" || (settings.up === "auto" && scene.isTerrain));
+  scene.project(settings.orthographic);
+  scene.dotFactor = settings.dots;
+  scene.isShaded = settings.depth;
+  if (scene.body && page.answer) scene.body.material.uniforms.hidesAway.value = hidesAway(page.answer);
+  scene.picker.view = "";
+  scene.draw();
 }
 
 /** @param {Partial<Settings>} changed */
-export function showPicture(changed = {}) {
+export async function showPicture(changed = {}) {
   const { settings, answer, cloud } = page;
   if (!answer || !cloud) return;
+  if ("unit" in changed) page.quantities = quantitiesOf(answer, cloud, settings.unit);
   const quantity = chosen();
   const range = rangeNow(quantity);
-  if (settings.colour === "support" && answer.fields.support) colourBySupport(answer.fields.support);
-  else scene.colour(quantity, range);
+  showWords(quantity, range);
+  if (Object.keys(changed).length > 0) showView();
+  if (OVERLAY_SETTINGS.some((name) => name in changed)) showExtras();
+  if (CUT_SETTINGS.some((name) => name in changed)) showCut();
+  await showColours(quantity, range, Object.keys(changed));
+}
+
+/**
+ * @param {Quantity | undefined} quantity
+ * @param {ColourRange} range
+ * @param {string[]} changed
+ */
+async function showColours(quantity, range, changed) {
+  const { settings, answer } = page;
+  const isRange = changed.length > 0 && changed.every((name) => RANGE_SETTINGS.includes(name));
+  if (settings.colour === "support" && answer?.fields.support) await colourBySupport(answer.fields.support);
+  else if (quantity?.channels) await scene.paint(quantity.channels, range);
+  else if (isRange) scene.range(range, !quantity);
+  else if (changed.length === 0 || changed.some((name) => ["quantity", "colour", "logarithmic"].includes(name))) {
+    await scene.colour(quantity, range);
+  }
+}
+
+/**
+ * What is said of the colours: title, ends, summary, histogram.
+ *
+ * @param {Quantity | undefined} quantity
+ * @param {ColourRange} range
+ */
+function showWords(quantity, range) {
+  const { answer, cloud, reasons, settings } = page;
+  if (!answer || !cloud) return;
   fieldOf("quantity").value = quantity?.id ?? "";
+  fieldOf("logarithmic").disabled = !isPositive(quantity);
+  fieldOf("logarithmic").title = isPositive(quantity) ? "" : "Only positive numbers have a logarithm.";
   for (const [name, end] of Object.entries({ low: range.low, high: range.high })) {
     const field = fieldOf(name);
     if (field !== document.activeElement) field.value = String(Number(end.toPrecision(4)));
@@ -94,56 +130,17 @@ export function showPicture(changed = {}) {
   const isHiding = quantity !== undefined && Number.isFinite(range.hide);
   at("hideText").textContent = isHiding ? `${shown(range.hide)} ${quantity.unit}` : "(nothing hidden)";
   at("title").textContent = quantity ? `${quantity.title}${quantity.unit ? `, ${quantity.unit}` : ""}` : "Points";
-  histogram.show(quantity, range);
-  at("summary").textContent = summaryOf({ answer, cloud, quantity, range, reasons: page.reasons });
-  if ("orthographic" in changed) scene.project(settings.orthographic);
-  if (OVERLAY_SETTINGS.some((name) => name in changed)) showExtras();
+  at("unitOfLength").hidden = settings.unit !== "";
+  histogram.show(quantity?.channels ? undefined : quantity, range);
+  at("summary").textContent = summaryOf({ answer, cloud, quantity, range, reasons });
 }
 
 /** @param {string[]} support */
-function colourBySupport(support) {
+async function colourBySupport(support) {
   const words = Object.keys(SUPPORT);
   const values = Float64Array.from(support, (word) => words.indexOf(word));
-  scene.colour({ values }, { low: 0, high: words.length - 1, hide: Infinity, full: 0, isSigned: true });
-}
-
-function showExtras() {
-  const { settings, answer, cloud, reasons } = page;
-  scene.clearExtras();
-  if (!answer || !cloud) return;
-  for (const [reason, { points, colour }] of reasons) if (!page.hidden.has(reason)) scene.mark(points, colour);
-  if (cloud.exact) scene.curve(cloud.exact, 0xf2c200);
-  const { normals, principal_directions: directions } = answer.tensors;
-  if (settings.arrows && normals) scene.arrows(normals);
-  if (settings.directions && directions) {
-    const d = cloud.points.width;
-    for (let of = 0; of < d - 1; of++) {
-      scene.arrows(directions, { offset: of * d, isBothWays: true, colour: [0xb0455f, 0x3f7fc4][of] });
-    }
-  }
-  page.cutting?.abort();
-  page.cutting = undefined;
-  if (settings.section !== "none") showSection(cloud, answer);
-}
-
-/**
- * @param {Cloud} cloud
- * @param {Answer} answer
- */
-async function showSection(cloud, answer) {
-  const cutting = new AbortController();
-  page.cutting = cutting;
-  const { settings } = page;
-  const plane = planeOf(cloud.points, Number(settings.section), settings.sectionAt);
-  try {
-    const cloudId = await idOf(cloud, cutting.signal);
-    const used = answer.fields.diagnostics;
-    const given = { cloudId, points: cloud.points, request: requestOf(settings), used, signal: cutting.signal };
-    const pixels = pixelsOf(await valuesOn(plane, given));
-    if (page.cutting === cutting) scene.section({ pixels, width: WIDTH, ...plane });
-  } catch (error) {
-    if (!cutting.signal.aborted) refuse(error);
-  }
+  const ends = { low: 0, middle: 0.5 * (words.length - 1), high: words.length - 1, isLogarithmic: false };
+  await scene.colour({ values }, { ...ends, map: "first", hide: Infinity, full: 0 });
 }
 
 function showScale() {
@@ -151,5 +148,5 @@ function showScale() {
   const power = 10 ** Math.floor(Math.log10(wanted));
   const length = [5, 2, 1].map((factor) => factor * power).find((size) => size <= wanted) ?? power;
   at("scale").style.width = `${length / scene.pixel()}px`;
-  at("scale").replaceChildren(element("span", { textContent: `${shown(length)} L` }));
+  at("scale").replaceChildren(element("span", { textContent: `${shown(length)} ${page.settings.unit || "L"}` }));
 }

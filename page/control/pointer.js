@@ -4,7 +4,8 @@
 import { showPinned, valueAt } from "../view/readout.js";
 import { all, at } from "./elements.js";
 import { page, scene } from "./page.js";
-import { chosen } from "./picture.js";
+import { measure } from "./measuring.js";
+import { chosen } from "./range.js";
 
 at("scene").addEventListener("pointermove", (event) => {
   if (event.buttons !== 0) return;
@@ -27,8 +28,13 @@ at("scene").addEventListener("pointerdown", (event) => {
 at("scene").addEventListener("click", (event) => {
   // The end of a turn is no click.
   if (Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) < 5)
-    pin(scene.pick(event.offsetX, event.offsetY));
+    choose(scene.pick(event.offsetX, event.offsetY));
 });
+
+/** @param {number | undefined} point */
+function choose(point) {
+  if (!measure(point)) pin(point);
+}
 
 /** @param {number | undefined} point */
 function pin(point) {
@@ -49,7 +55,7 @@ function pinMiddle() {
       [0, -1],
     ]) {
       const found = scene.pick(width / 2 + reach * x, height / 2 + reach * y);
-      if (found !== undefined) return pin(found);
+      if (found !== undefined) return choose(found);
     }
   }
 }

@@ -28,7 +28,7 @@ async function save(kind) {
   return offer(file, `${cloud.name.replace(/\.[^.]*$/, "")}.${kind}`);
 }
 
-function offer(blob, name) {
+export function offer(blob, name) {
   const link = element("a", { href: URL.createObjectURL(blob), download: name.replace(/^.*[/\\]/, "") });
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);

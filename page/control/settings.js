@@ -23,6 +23,8 @@ export function fillForm() {
   }
   const { operation, colour } = page.settings;
   for (const part of all("[data-for]")) part.hidden = part.dataset.for !== operation;
+  const cut = page.settings.cut === "box" || page.settings.cut === "none" ? page.settings.cut : "plane";
+  for (const part of all("[data-cut]")) part.hidden = part.dataset.cut !== cut;
   at("bySupport").checked = colour === "support";
   for (const button of all("[data-save=glb]")) button.hidden = operation !== "mesh";
 }
