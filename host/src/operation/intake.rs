@@ -140,7 +140,8 @@ impl<'a> Reader<'a> {
     fn begin(host: &'a Host, owner: Owner, headers: &HeaderMap) -> Result<Self, Problem> {
         let limit = host.guest.shares.body;
         let length = announced_length(headers);
-        // The refusal is immediate. The connection still reads on for a client that only listens after sending.
+        // The refusal is immediate. The connection still reads on for a client that only listens after
+        // sending.
         if let Some(required) = length.filter(|&length| length > limit) {
             return Err(too_large(limit, Some(required)));
         }
