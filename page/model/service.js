@@ -71,6 +71,11 @@ async function ask(path, options) {
   throw new Refusal({ status: response.status, ...problem });
 }
 
+/** A body in safetensors. Browsers send a blob beside the page, and an array within it. */
+function blobOf(tensors, request) {
+  return new Blob([encode(tensors, request)]);
+}
+
 async function sent(path, options) {
   try {
     return await fetch(path, options);
@@ -100,7 +105,7 @@ export async function register(points, normals, signal) {
   /** @type {Record<string, Tensor>} */
   const tensors = normals ? { points, normals } : { points };
   const headers = { "Content-Type": TENSORS, Accept: "application/json" };
-  const response = await ask("v1/clouds", { method: "POST", body: encode(tensors, {}), headers, signal });
+  const response = await ask("v1/clouds", { method: "POST", body: blobOf(tensors, {}), headers, signal });
   return (await response.json()).cloud_id;
 }
 
@@ -119,7 +124,7 @@ export async function register(points, normals, signal) {
  * @returns {Promise<Answer>}
  */
 export async function compute(path, request, { nPoints, signal, follow, tensors }) {
-  const body = tensors ? encode(tensors, request) : JSON.stringify(request);
+  const body = tensors ? blobOf(tensors, request) : JSON.stringify(request);
   const headers = { "Content-Type": tensors ? TENSORS : "application/json", Accept: TENSORS };
   const began = performance.now();
   const found = await answered(path, { method: "POST", body, headers, signal }, { nPoints, follow });

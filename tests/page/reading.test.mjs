@@ -2,7 +2,7 @@
 // Points that no surface can be computed from, and large files, which are read beside the page.
 
 import assert from "node:assert/strict";
-import { mkdtempSync, writeFileSync } from "node:fs";
+import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { test } from "node:test";
@@ -12,8 +12,8 @@ import { Tensor } from "../../page/model/tensors.js";
 import { gapsOf, repeatsOf, undirectedOf, without } from "../../page/reading/cleaning.js";
 import { opened, settled, sphere } from "./browser.mjs";
 
-/** Milliseconds that a task of the page may take. The aim is 200 on a machine that does nothing else. */
-const MAX_TASK = 600;
+/** Milliseconds that a task of the page may take where other programs run too. Alone, it takes below 100. */
+const MAX_TASK = 500;
 
 const tensor = (rows) => new Tensor(Float64Array.from(rows.flat()), [rows.length, rows[0].length]);
 
@@ -90,15 +90,20 @@ test("300,000 points are read and shown while the page answers", () =>
         const tasks = [];
         Object.assign(window, { tasks });
         const note = (list) => tasks.push(...list.getEntries().map(({ duration }) => duration));
-        new PerformanceObserver(note).observe({ type: "longtask" });
+        // What the browser does before the page has the file is not the page's.
+        document.querySelector("#file")?.addEventListener("change", () => {
+          new PerformanceObserver(note).observe({ type: "longtask" });
+        });
       });
       // By its path: the driver would decode its content in the page.
-      const path = join(mkdtempSync(join(tmpdir(), "gramian-page-")), "large.xyz");
+      const folder = mkdtempSync(join(tmpdir(), "gramian-page-"));
+      const path = join(folder, "large.xyz");
       writeFileSync(path, sphere(300_000));
       await page.setInputFiles("#file", path);
       await page.waitForFunction(() => document.querySelector("#summary")?.textContent.startsWith("large.xyz"));
       await page.click("#cancel");
       await settled(page);
+      rmSync(folder, { recursive: true });
       const tasks = await page.evaluate(() => /** @type {any} */ (window).tasks);
       const longest = Math.max(0, ...tasks);
       console.log(`longest task with 300,000 points: ${Math.round(longest)} ms`);
