@@ -34,7 +34,7 @@ export function read(bytes, name) {
 }
 
 /** A text without the mark that spreadsheets put before it. */
-function decoded(bytes) {
+export function decoded(bytes) {
   try {
     return new TextDecoder("utf-8", { fatal: true }).decode(bytes);
   } catch {
@@ -48,7 +48,7 @@ function decoded(bytes) {
  * @param {Map<string, Float64Array>} columns
  * @param {string} name
  */
-function cloudOf(columns, name) {
+export function cloudOf(columns, name) {
   const names = [...columns.keys()];
   const lower = new Map([...columns].map(([column, data]) => [column.toLowerCase(), { column, data }]));
   if (!lower.has("x") || !lower.has("y")) throw new Error(`the file has no columns x and y: ${names.join(", ")}`);
