@@ -25,7 +25,7 @@ export async function ask() {
   const timer = setTimeout(() => showProgress({}), 250);
   try {
     const answer = await withCloud(cloud, request, asking.signal);
-    if (page.asking === asking) showAnswer(answer, { isNew: settings.operation !== page.shown });
+    if (page.asking === asking) await showAnswer(answer, { isNew: settings.operation !== page.shown });
   } catch (error) {
     if (!asking.signal.aborted) refuse(error);
   } finally {

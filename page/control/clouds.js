@@ -69,8 +69,9 @@ async function showFirst(cloud) {
     operation === DEFAULTS.operation &&
     JSON.stringify(requestOf(page.settings)) === JSON.stringify(requestOf(DEFAULTS));
   const known = isDefault ? cloud.known : undefined;
-  showAnswer(known ?? { tensors: {}, fields: {} }, { isNew: true });
+  const showing = showAnswer(known ?? { tensors: {}, fields: {} }, { isNew: true });
   if (!known) return ask();
+  await showing;
   showRequest(requestOf(page.settings));
   document.body.dataset.state = "settled";
 }

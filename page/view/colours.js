@@ -4,8 +4,8 @@
 /** @import { Quantity, Scale } from "../types.d.ts" */
 
 /**
- * Colours of values along the bar, sRGB, by the name of the map. Diverging maps are for values on both sides of
- * their middle, which is yellow and not grey. Sequential ones are viridis and cividis (Nuñez et al. 2018).
+ * Colours of values along the bar, sRGB, by the name of the map. Diverging maps are for values on both sides
+ * of their middle, which is yellow and not grey. Sequential ones are viridis and cividis (Nuñez et al. 2018).
  *
  * @type {Record<string, { diverging: string[], sequential: string[] }>}
  */

@@ -54,7 +54,8 @@ export class Extras {
   }
 
   /**
-   * Arrows along vectors `[n, …]` at points, `offset` the vector's part of each row, both ways for directions.
+   * Arrows along vectors `[n, …]` at points, `offset` the vector's part of each row, both ways for
+   * directions.
    *
    * @param {Body} body
    * @param {{ width: number, data: ArrayLike<number> }} tensor

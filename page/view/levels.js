@@ -25,7 +25,7 @@ const VERTEX = `
   }
 `;
 
-/** Shades of green from low to high levels, and a line at the level of the surface, as in Guidotti's paper. */
+/** Shades of green from low to high levels, and a line at that of the surface, as in Guidotti's paper. */
 const FRAGMENT = `
   uniform sampler2D levels;
   varying vec2 place;

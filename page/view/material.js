@@ -14,7 +14,7 @@ import { textureOf } from "./colours.js";
 
 /** @import { Scale } from "../types.d.ts" */
 
-/** What points and meshes share: the share of a scale at which a value is, as shareOf in colours.js has it. */
+/** The share of a scale at which a value is, as shareOf in colours.js has it. */
 const SHARE = `
   uniform float low, middle, high, full;
   uniform bool isDiverging;

@@ -1,9 +1,8 @@
 // @ts-check
 // The point under the pointer, from a grid over the canvas that is made once for each view.
 
-/** Pixels of a side of a tile, and how far from the pointer a point is found. */
+/** Pixels of a side of a tile. */
 const TILE = 16;
-const REACH = 10;
 
 export class Picker {
   constructor() {
@@ -58,19 +57,19 @@ export class Picker {
     return Math.floor(y / TILE) * this.width + Math.floor(x / TILE);
   }
 
-  /** The nearest place in front within reach of a place on the canvas, or undefined. */
-  at(x, y) {
+  /** The nearest place in front within reach of a place on the canvas, all in pixels, or undefined. */
+  at(x, y, reach) {
     /** @type {number | undefined} */
     let found;
     let least = Infinity;
     const row = (pixel) => Math.floor(pixel / TILE);
-    for (let v = Math.max(0, row(y - REACH)); v <= Math.min(this.height - 1, row(y + REACH)); v++) {
-      for (let u = Math.max(0, row(x - REACH)); u <= Math.min(this.width - 1, row(x + REACH)); u++) {
+    for (let v = Math.max(0, row(y - reach)); v <= Math.min(this.height - 1, row(y + reach)); v++) {
+      for (let u = Math.max(0, row(x - reach)); u <= Math.min(this.width - 1, row(x + reach)); u++) {
         const tile = v * this.width + u;
         for (let index = this.begins[tile]; index < this.begins[tile + 1]; index++) {
           const at = this.points[index];
           const off = Math.hypot(this.across[at] - x, this.down[at] - y);
-          if (off > REACH) continue;
+          if (off > reach) continue;
           // A point a little behind but nearer to the pointer is the one that is meant.
           const score = this.depths[at] + 1e-4 * off;
           if (score < least) [found, least] = [at, score];

@@ -113,8 +113,8 @@ export class Scene {
   }
 
   /**
-   * Shows points, or a mesh if there are cells. Returns whether it was done: a later order ends an earlier one.
-   * Large clouds take a while, in which the page answers.
+   * Shows points, or a mesh if there are cells. Returns whether it was done: a later order ends an earlier
+   * one. Large clouds take a while, in which the page answers.
    */
   async show({ positions, cells, normals, hidesAway }) {
     const order = ++this.orders.show;
@@ -320,7 +320,9 @@ export class Scene {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     const view = { places: body.arrangement.places, elements, width, height, key: `${elements} ${width} ${height}` };
     this.picker.prepare(view, this.seen(body));
-    const place = this.picker.at(x, y);
+    // On a dot, or near it if it is small.
+    const reach = Math.min(Math.max((0.5 * body.dot * body.arrangement.spacing) / this.pixel(), 10), 40);
+    const place = this.picker.at(x, y, reach);
     return place === undefined ? undefined : body.pointAt(place);
   }
 

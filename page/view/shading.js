@@ -111,8 +111,8 @@ export class Shading {
    * @param {import("../vendor/three/three.module.min.js").Object3D} graph
    * @param {import("../vendor/three/three.module.min.js").OrthographicCamera |
    *   import("../vendor/three/three.module.min.js").PerspectiveCamera} camera
-   * @param {{ fineness: number, gap: number, isShaded: boolean }} options pixels of the texture for one of the
-   *   canvas along each side, the depth of a hole (0: none is filled), whether depth shades
+   * @param {{ fineness: number, gap: number, isShaded: boolean }} options pixels of the texture for one of
+   *   the canvas along each side, the depth of a hole (0: none is filled), whether depth shades
    */
   draw(graph, camera, { fineness, gap, isShaded }) {
     const { renderer, target } = this;
