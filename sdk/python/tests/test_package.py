@@ -24,7 +24,7 @@ from gramian import Cloud, InterpolationBatch, Kernel, KernelFamily, PosteriorBa
 from gramian.answers import Answer, Data
 from gramian.rest import models
 from gramian.rest.api.geometry import compute_normals
-from gramian.rest.models import CloudRef, NormalsRequest, NormalsResponse
+from gramian.rest.models import CloudInput, NormalsRequest, NormalsResponse
 from gramian.wire.tensors import Array, Format
 
 GAUSS = Kernel(family=KernelFamily.GAUSS, length_scale=2.0)
@@ -636,7 +636,7 @@ def cloud_kernel(cloud: Cloud) -> Kernel:
 def test_the_generated_client_serves_asyncio(client: gramian.Client, circle: Array) -> None:
     async def ask() -> object:
         async with client.rest as rest:
-            return await compute_normals.asyncio(client=rest, body=NormalsRequest(cloud=CloudRef(id=cloud.id)))
+            return await compute_normals.asyncio(client=rest, body=NormalsRequest(cloud=CloudInput(id=cloud.id)))
 
     cloud = client.cloud(circle)
     answer = asyncio.run(ask())

@@ -73,10 +73,10 @@ def test_no_argument_or_result_is_any() -> None:
 
 
 def test_requests_have_no_later_members() -> None:
-    sent = [models.CloudRef, models.Kernel, models.Surface, models.Samples, models.FreeParameter]
+    sent = [models.CloudInput, models.Kernel, models.Surface, models.SampleOptions, models.FreeParameter]
     sent += [models.MeshBounds]
     sent += [models.Hyperparameters, models.MeansLevel, models.NoiseRatio]  # as they were answered
-    sent += [models.Region, models.Border, models.TileRegions, models.Link]
+    sent += [models.Region, models.RegionAdjacency, models.TileRegions, models.RegionOverlap]
     for model in OBJECTS:
         is_request = model.__name__.endswith("Request") or model in sent
         if model is models.EstimateRequest:  # has the members of whichever request is meant
@@ -101,7 +101,7 @@ def test_enumerations_are_enumerations() -> None:
     assert hints["factorization"] is models.FactorizationUsed
     assert fields(models.Warning_)["code"] is models.WarningCode
     assert fields(models.PosteriorRequest)["include"] == list[models.PosteriorQuantity] | Unset
-    assert fields(models.NormalsRequest)["include"] == list[models.GeometryInclude] | Unset
+    assert fields(models.NormalsRequest)["include"] == list[models.GeometryAttribute] | Unset
 
 
 def test_nullable_entries_are_nullable_and_nothing_else_is() -> None:
@@ -123,7 +123,7 @@ def test_nullable_entries_are_nullable_and_nothing_else_is() -> None:
     nullable = {model.__name__ for model in OBJECTS for hint in fields(model).values() if type(None) in parts(hint)}
     # A matrix that is not positive definite has no score. A point on which the mean depends has no
     # prediction.
-    others = {"PathEntry", "FamilyScore", "LeftOut"}
+    others = {"AlphaScore", "FamilyScore", "LeaveOneOutPredictions"}
     assert all(name.endswith("Response") for name in nullable - others)
     assert not nullable & {"InterpolationResponse", "PosteriorResponse", "LaplaceBeltramiSparseMatrixResponse"}
 

@@ -14,7 +14,7 @@ use gramian_host::wire::read::points::Points;
 /// given.
 #[derive(Debug, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct CloudRef {
+pub struct CloudInput {
     /// The id of a registered cloud, 64 hexadecimal digits.
     #[schema(value_type = Option<CloudIdSchema>)]
     pub id: Option<String>,

@@ -1,7 +1,7 @@
 from enum import StrEnum
 
 
-class PosteriorOf(StrEnum):
+class PosteriorTarget(StrEnum):
     FUNCTION = "function"
     OBSERVATION = "observation"
 

@@ -7,11 +7,11 @@ from attrs import define as _attrs_define
 
 from ..types import UNSET, Unset, without_unset
 
-T = TypeVar("T", bound="CloudRef")
+T = TypeVar("T", bound="CloudInput")
 
 
 @_attrs_define
-class CloudRef:
+class CloudInput:
     """A cloud, given by the id of a registered cloud or by its points. Exactly one of `id` and `points` is
     given.
 
@@ -85,10 +85,10 @@ class CloudRef:
 
                 normals.append(normals_item)
 
-        cloud_ref = cls(
+        cloud_input = cls(
             id=id,
             points=points,
             normals=normals,
         )
 
-        return cloud_ref
+        return cloud_input

@@ -8,11 +8,11 @@ from attrs import field as _attrs_field
 
 from ..types import without_unset
 
-T = TypeVar("T", bound="LeftOut")
+T = TypeVar("T", bound="LeaveOneOutPredictions")
 
 
 @_attrs_define
-class LeftOut:
+class LeaveOneOutPredictions:
     """Predictions of each value from all others. A row that counts once with another has its prediction.
 
     Attributes:
@@ -103,14 +103,14 @@ class LeftOut:
 
             log_predictive_densities.append(log_predictive_densities_item)
 
-        left_out = cls(
+        leave_one_out_predictions = cls(
             means=means,
             variances=variances,
             log_predictive_densities=log_predictive_densities,
         )
 
-        left_out.additional_properties = d
-        return left_out
+        leave_one_out_predictions.additional_properties = d
+        return leave_one_out_predictions
 
     @property
     def additional_keys(self) -> list[str]:

@@ -7,20 +7,24 @@ from attrs import define as _attrs_define
 
 from ..types import without_unset
 
-T = TypeVar("T", bound="Link")
+T = TypeVar("T", bound="RegionAdjacency")
 
 
 @_attrs_define
-class Link:
-    """Two regions that have a point in common.
+class RegionAdjacency:
+    """Weights of the edges between two regions, or within one, by whether normals agree across them.
 
     Attributes:
-        first (int): The position of one of them among the regions of all tiles.
+        first (int): The position of one of the two regions among those of the tile.
         second (int): The position of the other one.
+        agreeing (float): The weight of the edges across which the normals agree.
+        opposing (float): The weight of the edges across which the normals are opposite.
     """
 
     first: int
     second: int
+    agreeing: float
+    opposing: float
 
     __repr__ = without_unset
 
@@ -29,12 +33,18 @@ class Link:
 
         second = self.second
 
+        agreeing = self.agreeing
+
+        opposing = self.opposing
+
         field_dict: dict[str, Any] = {}
 
         field_dict.update(
             {
                 "first": first,
                 "second": second,
+                "agreeing": agreeing,
+                "opposing": opposing,
             }
         )
 
@@ -47,9 +57,15 @@ class Link:
 
         second = d.pop("second")
 
-        link = cls(
+        agreeing = d.pop("agreeing")
+
+        opposing = d.pop("opposing")
+
+        region_adjacency = cls(
             first=first,
             second=second,
+            agreeing=agreeing,
+            opposing=opposing,
         )
 
-        return link
+        return region_adjacency

@@ -1,8 +1,7 @@
 from enum import StrEnum
 
 
-class MeshInclude(StrEnum):
-    CURVATURES = "curvatures"
+class ValueAttribute(StrEnum):
     STD = "std"
 
     def __str__(self) -> str:

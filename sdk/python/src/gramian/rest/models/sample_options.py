@@ -7,11 +7,11 @@ from attrs import define as _attrs_define
 
 from ..types import UNSET, Unset, without_unset
 
-T = TypeVar("T", bound="Samples")
+T = TypeVar("T", bound="SampleOptions")
 
 
 @_attrs_define
-class Samples:
+class SampleOptions:
     """Functions to draw from the posterior: their number and a seed.
 
     Attributes:
@@ -51,9 +51,9 @@ class Samples:
 
         seed = d.pop("seed", UNSET)
 
-        samples = cls(
+        sample_options = cls(
             count=count,
             seed=seed,
         )
 
-        return samples
+        return sample_options

@@ -8,11 +8,11 @@ from attrs import field as _attrs_field
 
 from ..types import UNSET, Unset, without_unset
 
-T = TypeVar("T", bound="PathEntry")
+T = TypeVar("T", bound="AlphaScore")
 
 
 @_attrs_define
-class PathEntry:
+class AlphaScore:
     """The score at one alpha, with everything else as selected.
 
     Attributes:
@@ -61,13 +61,13 @@ class PathEntry:
 
         score = _parse_score(d.pop("score", UNSET))
 
-        path_entry = cls(
+        alpha_score = cls(
             alpha=alpha,
             score=score,
         )
 
-        path_entry.additional_properties = d
-        return path_entry
+        alpha_score.additional_properties = d
+        return alpha_score
 
     @property
     def additional_keys(self) -> list[str]:

@@ -1,8 +1,8 @@
 from enum import StrEnum
 
 
-class GeometryInclude(StrEnum):
-    EDGE_NORMALS = "edge_normals"
+class MeshAttribute(StrEnum):
+    CURVATURES = "curvatures"
     STD = "std"
 
     def __str__(self) -> str:

@@ -1,7 +1,8 @@
 from enum import StrEnum
 
 
-class ValuesInclude(StrEnum):
+class GeometryAttribute(StrEnum):
+    EDGE_NORMALS = "edge_normals"
     STD = "std"
 
     def __str__(self) -> str:

@@ -7,24 +7,20 @@ from attrs import define as _attrs_define
 
 from ..types import without_unset
 
-T = TypeVar("T", bound="Border")
+T = TypeVar("T", bound="RegionOverlap")
 
 
 @_attrs_define
-class Border:
-    """What the edges between two regions say, or those within one.
+class RegionOverlap:
+    """Two regions that have a point in common.
 
     Attributes:
-        first (int): The position of one of the two regions among those of the tile.
+        first (int): The position of one of them among the regions of all tiles.
         second (int): The position of the other one.
-        agreeing (float): The weight of the edges across which the normals agree.
-        opposing (float): The weight of the edges across which the normals are opposite.
     """
 
     first: int
     second: int
-    agreeing: float
-    opposing: float
 
     __repr__ = without_unset
 
@@ -33,18 +29,12 @@ class Border:
 
         second = self.second
 
-        agreeing = self.agreeing
-
-        opposing = self.opposing
-
         field_dict: dict[str, Any] = {}
 
         field_dict.update(
             {
                 "first": first,
                 "second": second,
-                "agreeing": agreeing,
-                "opposing": opposing,
             }
         )
 
@@ -57,15 +47,9 @@ class Border:
 
         second = d.pop("second")
 
-        agreeing = d.pop("agreeing")
-
-        opposing = d.pop("opposing")
-
-        border = cls(
+        region_overlap = cls(
             first=first,
             second=second,
-            agreeing=agreeing,
-            opposing=opposing,
         )
 
-        return border
+        return region_overlap

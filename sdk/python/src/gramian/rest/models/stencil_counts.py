@@ -8,11 +8,11 @@ from attrs import field as _attrs_field
 
 from ..types import without_unset
 
-T = TypeVar("T", bound="StencilsUsed")
+T = TypeVar("T", bound="StencilCounts")
 
 
 @_attrs_define
-class StencilsUsed:
+class StencilCounts:
     """Number of rows of a sparse operator by how their weights were computed.
 
     Attributes:
@@ -73,7 +73,7 @@ class StencilsUsed:
 
         empty = d.pop("empty")
 
-        stencils_used = cls(
+        stencil_counts = cls(
             nearest=nearest,
             graded=graded,
             positive=positive,
@@ -81,8 +81,8 @@ class StencilsUsed:
             empty=empty,
         )
 
-        stencils_used.additional_properties = d
-        return stencils_used
+        stencil_counts.additional_properties = d
+        return stencil_counts
 
     @property
     def additional_keys(self) -> list[str]:
