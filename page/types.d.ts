@@ -46,27 +46,57 @@ export interface Diagnostics {
   warnings?: { detail: string }[];
 }
 
+/** Numbers of all points under a name, as files have them. */
+export interface Column {
+  name: string;
+  values: ArrayLike<number>;
+}
+
+/** Where a snippet has its points from: itself, or a file in the folder where it runs. */
+export interface Source {
+  inline?: { points: number[][]; normals?: number[][] };
+  file?: string;
+  mediaType?: string;
+  /** Whether the page makes that file, which the user has not. */
+  isMade?: boolean;
+}
+
 /** Numbers that points can be coloured by. */
 export interface Quantity {
   id: string;
   title: string;
   unit: string;
-  /** Whether 0 is in the middle of the colours. */
+  /** Whether 0 is in the middle of the colours, where there are values on both sides of it. */
   isSigned: boolean;
   values: ArrayLike<number>;
   deviations?: ArrayLike<number>;
+  /** Red, green and blue from 0 to 255, of points that have colours of their own. */
+  channels?: ArrayLike<number>[];
 }
 
-/** How numbers become colours. */
-export interface ColourRange {
+/** Places of values on a scale of colours, and the map that has the colours. */
+export interface Scale {
   low: number;
+  /** The value of the middle colour of a diverging map. A sequential map has none. */
+  middle?: number;
   high: number;
+  isLogarithmic: boolean;
+  map: string;
+}
+
+/** How numbers become colours, and which points are hidden. */
+export interface ColourRange extends Scale {
   /** The deviation at which a colour is grey. 0: no colour is. */
   full: number;
   /** The deviation beyond which a point is hidden. */
   hide: number;
-  isSigned: boolean;
   hasLines?: boolean;
+}
+
+/** A box of which the picture shows the inside, in coordinates of the cloud. */
+export interface Box {
+  low: number[];
+  high: number[];
 }
 
 /** Queries that are marked for one reason, and the colour of the marks. */
@@ -136,6 +166,11 @@ export interface Elements {
   scene: HTMLCanvasElement;
   scale: HTMLElement;
   tip: HTMLElement;
+  labels: HTMLElement;
+  axes: HTMLCanvasElement;
+  measure: HTMLButtonElement;
+  measured: HTMLElement;
+  unitOfLength: HTMLElement;
   progress: HTMLElement;
   cancel: HTMLButtonElement;
   refusal: HTMLElement;
@@ -147,6 +182,7 @@ export interface Elements {
   pinned: HTMLElement;
   link: HTMLButtonElement;
   languages: HTMLElement;
+  needs: HTMLElement;
   code: HTMLElement;
   copy: HTMLButtonElement;
   diagnostics: HTMLElement;

@@ -66,8 +66,9 @@ const SUBSCRIPTS = ["₁", "₂", "₃"];
  *
  * @param {Answer} answer
  * @param {Cloud} cloud
+ * @param {string} unit of length. "": L
  */
-export function quantitiesOf(answer, cloud) {
+export function quantitiesOf(answer, cloud, unit) {
   /** @type {Quantity[]} */
   const quantities = [];
   const isMesh = "vertices" in answer.tensors;
@@ -79,7 +80,7 @@ export function quantitiesOf(answer, cloud) {
       quantities.push({
         id: tensor.width > 1 ? `${name}.${at}` : name,
         title: (NAMES[name] ?? name.replaceAll("_", " ")) + index,
-        unit: unitOf(name, cloud.points.width),
+        unit: unitOf(name, cloud.points.width).replace("L", unit || "L"),
         isSigned: /curvatures$/.test(name),
         values: columnOf(tensor, at),
         deviations: columnOf(answer.tensors[`${name.replace(/s$/, "")}_std`], at),
@@ -91,9 +92,27 @@ export function quantitiesOf(answer, cloud) {
       quantities.push({ id: `given.${name}`, title: `${name} (given)`, unit: "", isSigned: false, values });
     }
   }
+  const channels = isMesh ? undefined : channelsOf(cloud.values);
+  if (channels) {
+    const title = "colours of the file";
+    quantities.push({ id: "colours", title, unit: "", isSigned: false, values: channels[0], channels });
+  }
   // Mean curvature first, standard deviations last.
   const rank = ({ id }) => (id === "mean_curvatures" ? 0 : id.endsWith("_std") || id.includes("_std.") ? 2 : 1);
   return quantities.sort((a, b) => rank(a) - rank(b));
+}
+
+/**
+ * Colours of points of their own, from 0 to 255. Programs write them in 8 bits, in 16 or from 0 to 1.
+ *
+ * @param {Map<string, Float64Array>} values
+ */
+function channelsOf(values) {
+  const channels = ["red", "green", "blue"].map((name) => values.get(name));
+  if (!channels.every((channel) => channel !== undefined)) return undefined;
+  const greatest = channels.reduce((most, channel) => channel.reduce((max, x) => Math.max(max, x), most), 0);
+  const factor = greatest <= 1 ? 255 : greatest <= 255 ? 1 : 255 / 65535;
+  return factor === 1 ? channels : channels.map((channel) => channel.map((x) => factor * x));
 }
 
 function columnOf(tensor, at) {

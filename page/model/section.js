@@ -4,16 +4,8 @@
 import { Tensor } from "./tensors.js";
 import { compute } from "./service.js";
 
-/** Pixels of a side. */
+/** Samples along a side of the plane. */
 export const WIDTH = 200;
-
-/** Width of a region of levels. */
-const STEP = 0.05;
-
-/** Shades of green from low to high levels, and the line of the surface's level, as in Guidotti's paper. */
-const LOW = [0.88, 0.95, 0.86];
-const HIGH = [0.05, 0.35, 0.15];
-const LINE = [0.85, 0.1, 0.1];
 
 /**
  * The plane through a cloud at right angles to an axis, at a part of the cloud's extent. Flat clouds are
@@ -78,20 +70,4 @@ export async function valuesOn(plane, { cloudId, points, request, used, signal }
   const found = Float64Array.from(answer.tensors.values.data);
   const level = found.subarray(WIDTH * WIDTH).reduce((sum, u) => sum + u, 0) / n;
   return { values: found.subarray(0, WIDTH * WIDTH), level };
-}
-
-/** Pixels of the level regions, with a line where u has the level of the surface. */
-export function pixelsOf({ values, level }) {
-  const pixels = new Uint8Array(4 * WIDTH * WIDTH);
-  values.forEach((u, at) => {
-    const neighbours = [
-      (at + 1) % WIDTH === 0 ? u : values[at + 1],
-      at + WIDTH < values.length ? values[at + WIDTH] : u,
-    ];
-    const isOnSurface = neighbours.some((next) => (u - level) * (next - level) < 0);
-    const share = Math.min(Math.max(0.5 + (Math.round((u - level) / STEP) * STEP) / 1.6, 0), 1);
-    const colour = isOnSurface ? LINE : LOW.map((channel, of) => channel + share * (HIGH[of] - channel));
-    pixels.set([...colour.map((channel) => Math.round(255 * channel)), 255], 4 * at);
-  });
-  return pixels;
 }

@@ -23,6 +23,24 @@ export const DEFAULTS = {
   high: NaN,
   hide: 1,
   suppress: true,
+  map: "first",
+  logarithmic: false,
+  centre: NaN,
+  unit: "",
+  dots: 1,
+  away: true,
+  depth: true,
+  cut: "none",
+  cutAt: 0.5,
+  cutFlip: false,
+  x0: 0,
+  x1: 1,
+  y0: 0,
+  y1: 1,
+  z0: 0,
+  z1: 1,
+  up: "auto",
+  frame: false,
   colour: "quantity",
   isolines: false,
   arrows: false,
@@ -83,6 +101,7 @@ export function fromHash(hash, words) {
     const kind = typeof DEFAULTS[name];
     if (kind === "boolean") settings[name] = text === "true";
     else if (kind === "number") settings[name] = Number.isFinite(Number(text)) ? Number(text) : DEFAULTS[name];
+    else if (name === "unit") settings.unit = text.slice(0, 8);
     else if (name === "quantity" || words[name]?.includes(text)) settings[name] = text;
   }
   return settings;

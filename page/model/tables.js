@@ -1,5 +1,5 @@
 // @ts-check
-// Clouds as rows of numbers. docs/operations.md has the rules ("Rows of numbers"). src/files/table is the
+// Clouds as rows of numbers. docs/formats.md has the rules ("Rows of numbers"). src/files/read/table is the
 // reader of the subcommands, and tests/tables holds both to the same outcomes.
 
 /** Decimal numbers, with a decimal point. Number() alone takes "" for 0, and hexadecimal digits. */

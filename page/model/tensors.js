@@ -20,6 +20,12 @@ export class Tensor {
   get width() {
     return this.shape.slice(1).reduce((product, length) => product * length, 1);
   }
+
+  /** Rows as lists of numbers. */
+  lists() {
+    const { data, rows, width } = this;
+    return Array.from({ length: rows }, (_, row) => Array.from(data.subarray(row * width, (row + 1) * width)));
+  }
 }
 
 /**

@@ -1,7 +1,7 @@
 // @ts-check
 // Histogram of a quantity over its colour bar. Both ends can be dragged, and clip.
 
-import { colourOf, cssOf, shown, sortedOf, ticks } from "./colours.js";
+import { colourOf, cssOf, levelOf, shareOf, shown, sortedOf, ticks } from "./colours.js";
 
 /** @import { ColourRange, Quantity } from "../types.d.ts" */
 
@@ -21,14 +21,14 @@ export class Histogram {
     /** @type {Quantity | undefined} */
     this.quantity = undefined;
     /** @type {ColourRange} */
-    this.range = { low: 0, high: 1, full: 0, hide: Infinity, isSigned: false };
+    this.range = { low: 0, high: 1, isLogarithmic: false, map: "first", full: 0, hide: Infinity };
     /**
      * The end that is dragged.
      * @type {"low" | "high" | undefined}
      */
     this.held = undefined;
     this.bins = new Float64Array(BINS);
-    /** Ends of the bins. */
+    /** Ends of the bins, and with them all places, are logarithms if the colours are logarithmic. */
     this.from = 0;
     this.to = 1;
     canvas.addEventListener("pointerdown", (event) => this.grab(event));
@@ -46,17 +46,17 @@ export class Histogram {
    * @param {ColourRange} range
    */
   show(quantity, range) {
-    if (quantity !== this.quantity) {
-      this.quantity = quantity;
-      this.count();
-    }
-    this.range = range;
+    const isOther = quantity !== this.quantity || range.isLogarithmic !== this.range.isLogarithmic;
+    Object.assign(this, { quantity, range });
+    if (isOther) this.count();
     this.draw();
   }
 
   /** Counts values over an interval somewhat wider than almost all of them. */
   count() {
-    const known = this.quantity ? sortedOf(this.quantity.values) : [];
+    const { isLogarithmic } = this.range;
+    const all = this.quantity ? sortedOf(this.quantity.values) : [];
+    const known = isLogarithmic ? all.filter((x) => x > 0).map(Math.log10) : all;
     this.bins = new Float64Array(BINS);
     if (known.length === 0) return;
     const at = (share) => known[Math.round(share * (known.length - 1))];
@@ -71,17 +71,24 @@ export class Histogram {
 
   /** Ends of what is drawn, which always includes the range. */
   ends() {
-    return [Math.min(this.from, this.range.low), Math.max(this.to, this.range.high)];
+    const [low, high] = [this.range.low, this.range.high].map((end) => levelOf(end, this.range.isLogarithmic));
+    return [Math.min(this.from, low), Math.max(this.to, high)];
   }
 
   placeOf(value) {
     const [from, to] = this.ends();
-    return SIDE + ((value - from) / (to - from)) * (this.canvas.clientWidth - 2 * SIDE);
+    const level = levelOf(value, this.range.isLogarithmic);
+    return SIDE + ((level - from) / (to - from)) * (this.canvas.clientWidth - 2 * SIDE);
   }
 
   valueAt(x) {
     const [from, to] = this.ends();
-    return from + ((x - SIDE) / (this.canvas.clientWidth - 2 * SIDE)) * (to - from);
+    const level = from + ((x - SIDE) / (this.canvas.clientWidth - 2 * SIDE)) * (to - from);
+    return this.valueOf(level);
+  }
+
+  valueOf(level) {
+    return this.range.isLogarithmic ? 10 ** level : level;
   }
 
   grab(event) {
@@ -96,9 +103,12 @@ export class Histogram {
   drag(event) {
     if (!this.held) return;
     const value = this.valueAt(event.offsetX);
-    const { low, high, isSigned } = this.range;
+    const { low, middle, high } = this.range;
     const ends = { low, high, [this.held]: value };
-    if (isSigned) Object.assign(ends, { low: -Math.abs(value), high: Math.abs(value) });
+    if (middle !== undefined) {
+      const half = Math.abs(value - middle);
+      Object.assign(ends, { low: middle - half, high: middle + half });
+    }
     if (ends.low < ends.high) this.changed(ends.low, ends.high);
   }
 
@@ -116,7 +126,7 @@ export class Histogram {
     context.fillStyle = ink;
     context.font = "12px system-ui, sans-serif";
     context.textAlign = "center";
-    for (const place of ticks(range.low, range.high, width < 260 ? 3 : 5)) {
+    for (const place of this.ticks(width < 260 ? 3 : 5)) {
       const x = this.placeOf(place);
       context.fillRect(x, height - FOOT + BAR, 1, 4);
       context.fillText(shown(Math.abs(place) < 1e-12 * range.high ? 0 : place), x, height - 4);
@@ -127,14 +137,22 @@ export class Histogram {
     }
   }
 
+  /** Round numbers below the bar. */
+  ticks(wanted) {
+    const { low, high, isLogarithmic } = this.range;
+    if (!isLogarithmic || high < 10 * low) return ticks(low, high, wanted);
+    const powers = ticks(Math.ceil(Math.log10(low) - 1e-9), Math.log10(high), wanted);
+    return powers.filter(Number.isInteger).map((power) => 10 ** power);
+  }
+
   bars(context, height) {
     const [top, base] = [12, height - FOOT];
     const most = Math.max(...this.bins, 1);
     for (let bin = 0; bin < BINS; bin++) {
       const [left, right] = [0, 1].map((side) =>
-        this.placeOf(this.from + ((bin + side) / BINS) * (this.to - this.from)),
+        this.placeOf(this.valueOf(this.from + ((bin + side) / BINS) * (this.to - this.from))),
       );
-      const middle = this.from + ((bin + 0.5) / BINS) * (this.to - this.from);
+      const middle = this.valueOf(this.from + ((bin + 0.5) / BINS) * (this.to - this.from));
       const length = this.bins[bin] > 0 ? Math.max(1, Math.sqrt(this.bins[bin] / most) * (base - top)) : 0;
       context.fillStyle = this.colourAt(middle, 0);
       context.fillRect(left, base - length, Math.max(1, right - left - 0.5), length);
@@ -154,7 +172,6 @@ export class Histogram {
   }
 
   colourAt(value, s) {
-    const { low, high, isSigned } = this.range;
-    return cssOf(colourOf((value - low) / (high - low), s, isSigned));
+    return cssOf(colourOf(shareOf(value, this.range), s, this.range));
   }
 }

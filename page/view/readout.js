@@ -124,7 +124,22 @@ export function valueAt(quantity, point) {
   if (!quantity) return "";
   const deviation = quantity.deviations?.[point];
   const known = deviation !== undefined && Number.isFinite(deviation) ? ` ± ${shown(deviation)}` : "";
-  return `${shown(quantity.values[point])}${known} ${quantity.unit}`.trim();
+  if (quantity.channels) return `red, green, blue ${quantity.channels.map((of) => shown(of[point])).join(", ")}`;
+  return `${shown(quantity.values[point])}${known} ${quantity.unit}${radiusOf(quantity, point)}`.trim();
+}
+
+/**
+ * The radius of curvature 1/|κ| beside a curvature, with the deviation σ/κ² where it is small beside it.
+ *
+ * @param {Quantity} quantity
+ * @param {number} point
+ */
+function radiusOf({ id, values, deviations, unit }, point) {
+  const curvature = Math.abs(values[point]);
+  if (!/^(mean|principal)_curvatures/.test(id) || !(curvature > 0)) return "";
+  const deviation = deviations ? deviations[point] / curvature ** 2 : NaN;
+  const known = deviation < 0.5 / curvature ? ` ± ${shown(deviation)}` : "";
+  return ` (radius ${shown(1 / curvature)}${known} ${unit.replace("1/", "")})`;
 }
 
 /**
@@ -146,7 +161,12 @@ export function showPinned(into, point, { quantities, answer, cloud, reasons }) 
   into.hidden = false;
 }
 
-function list(rows) {
+/**
+ * A list of names with their texts.
+ *
+ * @param {(string | undefined)[][]} rows
+ */
+export function list(rows) {
   const entries = rows.flatMap(([name, text]) => [
     element("dt", { textContent: name }),
     element("dd", { textContent: text }),

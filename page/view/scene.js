@@ -1,45 +1,35 @@
 // @ts-check
-// The picture: points or a mesh, marks, arrows, and a cross-section.
+// The picture: points or a mesh, what is drawn over them, and the view.
 
 import {
-  Box3,
-  BufferAttribute,
-  BufferGeometry,
-  Color,
-  DataTexture,
-  DoubleSide,
-  Group,
-  Line,
-  LineBasicMaterial,
-  LineSegments,
-  Mesh,
-  MeshBasicMaterial,
   OrthographicCamera,
   PerspectiveCamera,
-  PlaneGeometry,
-  Points,
-  RGBAFormat,
   Scene as Graph,
-  Sphere,
-  SRGBColorSpace,
   Vector3,
   WebGLRenderer,
 } from "../vendor/three/three.module.min.js";
 import { OrbitControls } from "../vendor/three/OrbitControls.js";
-import { uniform } from "../model/examples.js";
-import { colours, quantityMaterial, ringMaterial } from "./material.js";
+import { arrange, Body } from "./body.js";
+import { levelOf } from "./colours.js";
+import { Extras } from "./extras.js";
+import { levelPlane } from "./levels.js";
+import { colourTexture } from "./material.js";
+import { Picker } from "./picker.js";
+import { Shading } from "./shading.js";
 
-/** @import { ColourRange } from "../types.d.ts" */
+/** @import { Box, ColourRange } from "../types.d.ts" */
 
 /** Points drawn while the view moves. All are drawn once it stands still. */
 const MOVING = 150_000;
 
-const MAX_ARROWS = 3000;
+/** Points up to which the picture is drawn twice as fine as the screen, and made coarser. */
+const FINE = 400_000;
 
-/** Stands for a value that there is not. Graphics processors may take NaN for a number. */
-const UNKNOWN = -1e30;
+/** Spacings by which a hole between points lies behind those around it. */
+const GAP = 4;
 
-const UPRIGHT = new Vector3(0, 1, 0);
+/** The longer side of terrain is at least so many times its height. */
+const TERRAIN = 5;
 
 export class Scene {
   /**
@@ -53,92 +43,97 @@ export class Scene {
     this.changed = changed;
     this.renderer = new WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
-    this.graph = new Graph();
+    this.renderer.autoClear = false;
+    this.shading = new Shading(this.renderer);
+    /** What is shaded by depth, and what is drawn over it. */
+    this.solid = new Graph();
+    this.over = new Graph();
+    this.extras = new Extras();
+    /** The line between two points that are measured. */
+    this.ruler = new Extras();
+    this.over.add(this.extras.group, this.ruler.group);
     this.perspective = new PerspectiveCamera(40, 1, 0.01, 100);
     this.orthographic = new OrthographicCamera(-1, 1, 1, -1, 0.01, 100);
     /** @type {PerspectiveCamera | OrthographicCamera} */
     this.camera = this.perspective;
-    this.controls = new OrbitControls(this.camera, canvas);
-    this.controls.addEventListener("start", () => {
-      this.isMoving = true;
-    });
-    this.controls.addEventListener("end", () => {
-      this.isMoving = false;
-      this.draw();
-    });
-    this.controls.addEventListener("change", () => this.draw());
-    this.extras = new Group();
-    this.graph.add(this.extras);
+    this.up = new Vector3(0, 1, 0);
+    this.controls = this.control();
     this.isMoving = false;
-    this.radius = 1;
-    this.spacing = 1;
-    this.dot = 1;
-    this.n = 0;
-    this.dimension = 3;
-    /** Positions of what is drawn, about the middle. */
-    this.placed = new Float32Array();
-    this.middle = [0, 0, 0];
+    this.isShaded = true;
+    this.dotFactor = 1;
+    /** @type {Box | undefined} */
+    this.box = undefined;
+    this.picker = new Picker();
     /**
-     * The point of the cloud at each place that is drawn, where they are shuffled.
-     * @type {Uint32Array | undefined}
+     * What is shown.
+     * @type {Body | undefined}
      */
-    this.order = undefined;
-    /** @type {Points | Mesh | undefined} */
-    this.object = undefined;
-    this.material = quantityMaterial(true);
+    this.body = undefined;
     /** The range that the values in the buffers are relative to. */
-    this.low = 0;
-    this.high = 1;
+    this.base = { low: 0, high: 1 };
+    /** Orders to show and to colour. The last one is carried out. */
+    this.orders = { show: 0, colour: 0 };
     /**
      * The frame that is waited for.
      * @type {number | undefined}
      */
     this.awaited = undefined;
-    this.scales = { signed: colours(true), plain: colours(false) };
     new ResizeObserver(() => this.resize()).observe(this.frame);
   }
 
-  /**
-   * Shows points, or a mesh if there are cells. Positions are relative to their middle, since the graphics
-   * processor has 32 bits.
-   */
-  show({ positions, cells, normals, nearby }) {
-    const [n, d] = positions.shape;
-    this.dimension = d;
-    this.n = n;
-    this.clear(this.graph, this.object);
-    this.middle = middleOf(positions);
-    this.placed = new Float32Array(3 * n);
-    this.order = cells ? undefined : shuffled(n);
-    const places = this.order ?? Uint32Array.from({ length: n }, (_, at) => at);
-    const turned = new Float32Array(3 * n);
-    places.forEach((from, to) => {
-      for (let axis = 0; axis < d; axis++) {
-        this.placed[3 * to + axis] = positions.data[from * d + axis] - this.middle[axis];
-        const c = normals?.data[from * d + axis];
-        if (Number.isFinite(c)) turned[3 * to + axis] = c;
-      }
+  get radius() {
+    return this.body?.arrangement.radius ?? 1;
+  }
+
+  get dimension() {
+    return this.body?.arrangement.dimension ?? 3;
+  }
+
+  /** Whether the cloud is a part of the ground, whose height is its third coordinate. */
+  get isTerrain() {
+    if (!this.body || this.dimension === 2) return false;
+    const { low, high } = this.body.arrangement;
+    const [x, y, z] = low.map((least, axis) => high[axis] - least);
+    return Math.max(x, y) > TERRAIN * z && Math.min(x, y) > 1.2 * z;
+  }
+
+  /** Makes the controls anew, since they take the upright axis once. */
+  control() {
+    this.camera.up.copy(this.up);
+    const controls = new OrbitControls(this.camera, this.canvas);
+    controls.addEventListener("start", () => {
+      this.isMoving = true;
     });
-    const geometry = new BufferGeometry();
-    const placed = new BufferAttribute(this.placed, 3);
-    geometry.setAttribute("position", placed);
-    geometry.setAttribute("normal", new BufferAttribute(turned, 3));
-    geometry.setAttribute("value", new BufferAttribute(new Float32Array(n), 1));
-    geometry.setAttribute("deviation", new BufferAttribute(new Float32Array(n), 1));
-    const isPoint = !cells || d === 2;
-    this.material = quantityMaterial(isPoint);
-    if (cells && d === 3) geometry.setIndex(new BufferAttribute(Uint32Array.from(cells.data), 1));
-    this.object = isPoint ? new Points(geometry, this.material) : new Mesh(geometry, this.material);
-    this.object.frustumCulled = false;
-    this.graph.add(this.object);
-    this.radius = new Box3().setFromBufferAttribute(placed).getBoundingSphere(new Sphere()).radius || 1;
-    this.spacing = d === 2 ? (6 * this.radius) / nearby : (2.4 * this.radius) / Math.sqrt(nearby);
-    // Dots on a curve would hide it if they touched.
-    this.dot = (d === 2 ? 0.4 : 0.85) * this.spacing;
-    this.material.uniforms.size.value = this.dot;
-    this.material.uniforms.isFlat.value = d === 2 || !normals;
-    if (cells && d === 2) this.object.add(lines(geometry, cells.data, 0x8899aa));
+    controls.addEventListener("end", () => {
+      this.isMoving = false;
+      this.draw();
+    });
+    controls.addEventListener("change", () => this.draw());
+    return controls;
+  }
+
+  /**
+   * Shows points, or a mesh if there are cells. Returns whether it was done: a later order ends an earlier
+   * one. Large clouds take a while, in which the page answers.
+   */
+  async show({ positions, cells, normals, hidesAway }) {
+    const order = ++this.orders.show;
+    const body = new Body(await arrange(positions, cells !== undefined), cells);
+    await body.turn(normals);
+    if (order !== this.orders.show) return false;
+    if (this.body) {
+      this.solid.remove(this.body.object);
+      this.body.dispose();
+    }
+    this.extras.clear();
+    this.ruler.clear();
+    this.body = body;
+    this.body.material.uniforms.hidesAway.value = hidesAway;
+    this.solid.add(body.object);
+    this.picker.view = "";
+    this.cut(undefined);
     this.resize();
+    return true;
   }
 
   /**
@@ -147,130 +142,109 @@ export class Scene {
    * @param {{ values: ArrayLike<number>, deviations?: ArrayLike<number> } | undefined} quantity
    * @param {ColourRange} range
    */
-  colour(quantity, { low, high, hide, full, isSigned, hasLines }) {
-    if (!this.object) return;
-    const { value, deviation } = this.object.geometry.attributes;
-    this.low = low;
-    this.high = high;
-    const source = (at) => (this.order ? this.order[at] : at);
-    for (let at = 0; at < this.n; at++) {
-      // Relative to the range, since these have 32 bits. What is not known has numbers of its own.
-      const share = quantity ? (quantity.values[source(at)] - this.low) / (this.high - this.low) : 0;
-      const off = quantity?.deviations ? quantity.deviations[source(at)] : 0;
-      value.array[at] = Number.isNaN(share) ? UNKNOWN : share;
-      deviation.array[at] = Number.isFinite(off) ? off : -UNKNOWN;
-    }
-    value.needsUpdate = true;
-    deviation.needsUpdate = true;
-    this.range({ low, high, hide, full, isSigned, isPlain: !quantity, hasLines });
-  }
-
-  /** Changes how values become colours. */
-  range({ low, high, hide, full, isSigned, isPlain, hasLines }) {
-    const { uniforms } = this.material;
-    uniforms.low.value = (low - this.low) / (this.high - this.low);
-    uniforms.high.value = (high - this.low) / (this.high - this.low);
-    uniforms.hide.value = Number.isFinite(hide) ? hide : 3e38;
-    uniforms.full.value = full;
-    uniforms.hasLines.value = hasLines ?? false;
-    uniforms.isPlain.value = isPlain ? 1 : 0;
-    uniforms.colours.value = this.scales[isSigned ? "signed" : "plain"];
-    this.draw();
-  }
-
-  /** Removes marks, arrows and sections. */
-  clearExtras() {
-    for (const child of [...this.extras.children]) this.clear(this.extras, child);
-  }
-
-  /** Marks points without an answer. */
-  mark(points, colour) {
-    const material = ringMaterial(colour);
-    material.uniforms.size.value = 0.6 * this.dot;
-    const places = new Float32Array(3 * points.length);
-    const at = this.placeOf();
-    points.forEach((point, row) => {
-      places.set(this.placed.subarray(3 * at(point), 3 * at(point) + 3), 3 * row);
-    });
-    const geometry = new BufferGeometry();
-    geometry.setAttribute("position", new BufferAttribute(places, 3));
-    const marks = new Points(geometry, material);
-    marks.frustumCulled = false;
-    this.extras.add(marks);
-    this.resize();
-  }
-
-  /** Where a point of the cloud is among those drawn, which are shuffled. */
-  placeOf() {
-    if (!this.order) return (point) => point;
-    const at = new Uint32Array(this.n);
-    for (const [place, point] of this.order.entries()) at[point] = place;
-    return (point) => at[point];
+  async colour(quantity, range) {
+    const { body } = this;
+    if (!body) return;
+    const order = ++this.orders.colour;
+    const isWanted = () => order === this.orders.colour && body === this.body;
+    await body.fill(quantity, range, isWanted);
+    if (!isWanted()) return;
+    this.base = range;
+    body.material.uniforms.isPainted.value = false;
+    this.range(range, !quantity);
   }
 
   /**
-   * Arrows along vectors `[n, …]` at points, `from` the vector's part of each row, both ways for directions.
+   * Colours by red, green and blue.
+   *
+   * @param {ArrayLike<number>[]} channels
+   * @param {ColourRange} range
    */
-  arrows(tensor, { offset = 0, isBothWays = false, colour = 0x4477aa } = {}) {
-    const d = this.dimension;
-    const every = Math.max(1, Math.ceil(this.n / MAX_ARROWS));
-    const length = (isBothWays ? 0.6 : 1.6) * this.spacing * Math.sqrt(every);
-    const ends = [];
-    for (let at = 0; at < this.n; at += every) {
-      const row = (this.order ? this.order[at] : at) * tensor.width + offset;
-      const along = Array.from({ length: 3 }, (_, axis) => (axis < d ? length * tensor.data[row + axis] : 0));
-      if (!along.every(Number.isFinite)) continue;
-      const place = this.placed.subarray(3 * at, 3 * at + 3);
-      ends.push(
-        ...along.map((c, axis) => place[axis] - (isBothWays ? c : 0)),
-        ...along.map((c, axis) => place[axis] + c),
-      );
+  async paint(channels, range) {
+    const { body } = this;
+    if (!body) return;
+    const order = ++this.orders.colour;
+    await body.paint(channels);
+    await body.fill(undefined, range, () => true);
+    if (order !== this.orders.colour || body !== this.body) return;
+    this.base = range;
+    body.material.uniforms.isPainted.value = true;
+    this.range(range, false);
+  }
+
+  /**
+   * Changes how values become colours.
+   *
+   * @param {ColourRange} range
+   * @param {boolean} isPlain
+   */
+  range(range, isPlain) {
+    if (!this.body) return;
+    const { uniforms } = this.body.material;
+    const [from, to] = [this.base.low, this.base.high].map((end) => levelOf(end, range.isLogarithmic));
+    const share = (end) => (levelOf(end, range.isLogarithmic) - from) / (to - from);
+    uniforms.low.value = share(range.low);
+    uniforms.high.value = share(range.high);
+    uniforms.isDiverging.value = range.middle !== undefined;
+    uniforms.middle.value = range.middle === undefined ? 0 : share(range.middle);
+    uniforms.hide.value = Number.isFinite(range.hide) ? range.hide : 3e38;
+    uniforms.full.value = range.full;
+    uniforms.hasLines.value = range.hasLines ?? false;
+    uniforms.isPlain.value = isPlain ? 1 : 0;
+    uniforms.colours.value?.dispose();
+    uniforms.colours.value = colourTexture(range);
+    this.draw();
+  }
+
+  /**
+   * Shows what is inside a box alone.
+   *
+   * @param {Box | undefined} box
+   */
+  cut(box) {
+    this.box = box;
+    const middle = this.body?.arrangement.middle ?? [0, 0, 0];
+    const endOf = (ends, otherwise) => new Vector3(...middle.map((x, axis) => (ends ? ends[axis] - x : otherwise)));
+    const [low, high] = [endOf(box?.low, -1e30), endOf(box?.high, 1e30)];
+    for (const graph of [this.solid, this.over]) {
+      graph.traverse((/** @type {any} */ { material }) => {
+        material?.uniforms?.boxLow?.value.copy(low);
+        material?.uniforms?.boxHigh?.value.copy(high);
+      });
     }
-    const geometry = new BufferGeometry();
-    geometry.setAttribute("position", new BufferAttribute(Float32Array.from(ends), 3));
-    this.extras.add(new LineSegments(geometry, new LineBasicMaterial({ color: colour })));
+    this.picker.view = "";
     this.draw();
   }
 
-  /** Draws a polyline in the plane. */
-  curve(rows, colour) {
-    const places = rows.flatMap(([x, y]) => [x - this.middle[0], y - this.middle[1], 0]);
-    const geometry = new BufferGeometry();
-    geometry.setAttribute("position", new BufferAttribute(Float32Array.from(places), 3));
-    this.extras.add(new Line(geometry, new LineBasicMaterial({ color: colour })));
-    this.draw();
-  }
-
-  /** Shows a square picture on a plane: pixels of width × width, spanned by two half edges about a centre. */
-  section({ pixels, width, centre, along, up }) {
-    const texture = new DataTexture(pixels, width, width, RGBAFormat);
-    texture.colorSpace = SRGBColorSpace;
-    texture.needsUpdate = true;
-    const material = new MeshBasicMaterial({ map: texture, side: DoubleSide, transparent: true, opacity: 0.85 });
-    const plane = new Mesh(new PlaneGeometry(2, 2), material);
-    const [x, y, o] = [along, up, centre].map((vector) => new Vector3(...vector));
-    o.sub(new Vector3(...this.middle));
-    // In the plane it lies behind the points.
-    if (this.dimension === 2) o.z -= 0.02 * this.radius;
-    plane.matrixAutoUpdate = false;
-    plane.matrix.makeBasis(x, y, new Vector3().crossVectors(x, y).normalize()).setPosition(o);
-    this.extras.add(plane);
+  /** Shows the levels of u on a plane that two half edges span about a centre. */
+  section(levels, width, plane) {
+    if (!this.body) return;
+    this.extras.place(this.body, levelPlane(levels, width), plane);
     this.draw();
   }
 
   /** Looks at everything, along an axis, or at the plane of a flat cloud. */
   fit(axis) {
     const isFlat = this.dimension === 2;
-    const direction = isFlat ? new Vector3(0, 0, 1) : axis ? new Vector3(...axis) : new Vector3(0.35, 0.3, 0.9);
+    const isUpright = this.up.y === 1;
+    const home = isUpright ? new Vector3(0.35, 0.3, 0.9) : new Vector3(0.35, -0.9, 0.45);
+    const direction = isFlat ? new Vector3(0, 0, 1) : axis ? new Vector3(...axis) : home;
     this.controls.enableRotate = !isFlat;
     this.controls.target.set(0, 0, 0);
-    // The controls took this axis once, and keep off its poles.
-    this.camera.up.copy(UPRIGHT);
     this.camera.position.copy(direction.normalize().multiplyScalar(2.7 * this.radius));
     this.orthographic.zoom = 1;
     this.resize();
     this.controls.update();
     this.draw();
+  }
+
+  /** Chooses the axis that points up, z or y. The view stays where it does not change. */
+  raise(isZ) {
+    if ((this.up.z === 1) === isZ) return;
+    this.up.set(0, isZ ? 0 : 1, isZ ? 1 : 0);
+    this.controls.dispose();
+    this.controls = this.control();
+    this.fit();
   }
 
   /** Chooses parallel or central projection. The view stays. */
@@ -297,21 +271,17 @@ export class Scene {
     const { clientWidth: width, clientHeight: height } = this.frame;
     if (width === 0 || height === 0) return;
     this.renderer.setSize(width, height, false);
-    const [near, far, half] = [0.005 * this.radius, 30 * this.radius, 1.1 * this.radius];
+    const [near, far, half] = [0.02 * this.radius, 30 * this.radius, 1.1 * this.radius];
     const aspect = width / height;
     const [across, up] = aspect > 1 ? [half * aspect, half] : [half, half / aspect];
     Object.assign(this.perspective, { aspect, near, far });
     Object.assign(this.orthographic, { left: -across, right: across, top: up, bottom: -up, near, far });
     for (const camera of [this.perspective, this.orthographic]) camera.updateProjectionMatrix();
-    const pixels = 0.5 * height * this.renderer.getPixelRatio();
-    this.graph.traverse((/** @type {any} */ { material }) => {
-      if (material?.uniforms?.height) material.uniforms.height.value = pixels;
-    });
     this.draw();
   }
 
   background(colour) {
-    this.graph.background = new Color(colour);
+    this.shading.background.set(colour).convertLinearToSRGB();
     this.draw();
   }
 
@@ -324,45 +294,88 @@ export class Scene {
   }
 
   render() {
-    if (!this.object) return;
-    if (this.order) this.object.geometry.setDrawRange(0, this.isMoving ? MOVING : Infinity);
-    this.renderer.render(this.graph, this.camera);
+    const { body, renderer } = this;
+    if (!body) return;
+    const { n, spacing } = body.arrangement;
+    const isThinned = this.isMoving && !body.isMesh && n > MOVING;
+    body.geometry.setDrawRange(0, isThinned && body.arrangement.order ? MOVING : Infinity);
+    // Fewer dots are as much larger.
+    body.material.uniforms.size.value = body.dot * this.dotFactor * (isThinned ? Math.sqrt(n / MOVING) : 1);
+    const fineness = n <= FINE && !this.isMoving && renderer.getPixelRatio() < 2 ? 2 : 1;
+    const half = 0.5 * this.frame.clientHeight * renderer.getPixelRatio();
+    setHeight(this.solid, half * fineness);
+    setHeight(this.over, half);
+    const gap = body.isMesh || this.dimension === 2 ? 0 : GAP * spacing;
+    this.shading.draw(this.solid, this.camera, { fineness, gap, isShaded: this.isShaded && this.dimension === 3 });
+    renderer.render(this.over, this.camera);
     this.changed();
   }
 
   /** The nearest point in front at a place on the canvas, in pixels, or undefined. */
   pick(x, y) {
-    if (!this.object) return undefined;
-    this.camera.updateMatrixWorld();
-    const elements = this.camera.projectionMatrix.clone().multiply(this.camera.matrixWorldInverse).elements;
+    const { body, camera } = this;
+    if (!body) return undefined;
+    camera.updateMatrixWorld();
+    const elements = camera.projectionMatrix.clone().multiply(camera.matrixWorldInverse).elements;
     const { clientWidth: width, clientHeight: height } = this.canvas;
-    const reach = 10;
-    /** @type {number | undefined} */
-    let found;
-    let depth = Infinity;
-    for (let at = 0; at < this.n; at++) {
-      const [a, b, c] = [this.placed[3 * at], this.placed[3 * at + 1], this.placed[3 * at + 2]];
-      const w = elements[3] * a + elements[7] * b + elements[11] * c + elements[15];
-      if (w <= 0) continue;
-      const across =
-        (0.5 + (0.5 * (elements[0] * a + elements[4] * b + elements[8] * c + elements[12])) / w) * width - x;
-      if (Math.abs(across) > reach) continue;
-      const down =
-        (0.5 - (0.5 * (elements[1] * a + elements[5] * b + elements[9] * c + elements[13])) / w) * height - y;
-      if (Math.abs(down) > reach) continue;
-      const z = (elements[2] * a + elements[6] * b + elements[10] * c + elements[14]) / w;
-      // A point a little behind but nearer to the pointer is the one that is meant.
-      const score = z + 1e-4 * Math.hypot(across, down);
-      if (score < depth) [found, depth] = [at, score];
-    }
-    return found === undefined ? undefined : this.order ? this.order[found] : found;
+    const view = { places: body.arrangement.places, elements, width, height, key: `${elements} ${width} ${height}` };
+    this.picker.prepare(view, this.seen(body));
+    // On a dot, or near it if it is small.
+    const reach = Math.min(Math.max((0.5 * body.dot * body.arrangement.spacing) / this.pixel(), 10), 40);
+    const place = this.picker.at(x, y, reach);
+    return place === undefined ? undefined : body.pointAt(place);
+  }
+
+  /**
+   * Whether a place can be seen: it is neither cut away nor looks away.
+   *
+   * @param {Body} body
+   */
+  seen({ arrangement: { places, middle }, geometry, material }) {
+    const { box } = this;
+    const normals = geometry.attributes.normal.array;
+    const { hidesAway, isFlat } = material.uniforms;
+    const looksAway = hidesAway.value && !isFlat.value;
+    const eye = this.camera.position;
+    const isParallel = this.camera === this.orthographic;
+    return (place) => {
+      const at = 3 * place;
+      for (let axis = 0; box && axis < 3; axis++) {
+        const x = places[at + axis] + middle[axis];
+        if (x < box.low[axis] || x > box.high[axis]) return false;
+      }
+      if (!looksAway) return true;
+      const from = isParallel ? [0, 0, 0] : [places[at], places[at + 1], places[at + 2]];
+      const facing =
+        normals[at] * (eye.x - from[0]) + normals[at + 1] * (eye.y - from[1]) + normals[at + 2] * (eye.z - from[2]);
+      return facing >= 0;
+    };
   }
 
   /** Where a point is on the canvas, in pixels. */
   onCanvas(point) {
-    const at = 3 * this.placeOf()(point);
-    const place = new Vector3(...this.placed.subarray(at, at + 3)).project(this.camera);
+    if (!this.body) return [0, 0];
+    const at = 3 * this.body.placeOf()(point);
+    return this.placeOnCanvas(this.body.arrangement.places.subarray(at, at + 3));
+  }
+
+  /**
+   * Where a place is on the canvas, in pixels.
+   *
+   * @param {ArrayLike<number>} of
+   */
+  placeOnCanvas(of) {
+    const place = new Vector3(of[0], of[1], of[2]).project(this.camera);
     return [(0.5 + 0.5 * place.x) * this.canvas.clientWidth, (0.5 - 0.5 * place.y) * this.canvas.clientHeight];
+  }
+
+  /** Directions of the axes on the canvas, to the right and down, with the part that points at the viewer. */
+  axes() {
+    const inverse = this.camera.quaternion.clone().invert();
+    return [0, 1, 2].map((axis) => {
+      const { x, y, z } = new Vector3().setComponent(axis, 1).applyQuaternion(inverse);
+      return [x, -y, z];
+    });
   }
 
   /** Length of a pixel where the view is aimed, for the scale bar. */
@@ -374,48 +387,11 @@ export class Scene {
     const distance = this.camera.position.distanceTo(this.controls.target);
     return (2 * distance * Math.tan((Math.PI * this.perspective.fov) / 360)) / height;
   }
-
-  clear(parent, object) {
-    if (!object) return;
-    parent.remove(object);
-    object.traverse(({ geometry, material }) => {
-      geometry?.dispose();
-      material?.map?.dispose();
-      material?.dispose();
-    });
-  }
 }
 
-/** Lines between points of a geometry. */
-function lines(points, cells, colour) {
-  const geometry = new BufferGeometry();
-  geometry.setAttribute("position", points.attributes.position);
-  geometry.setIndex(new BufferAttribute(Uint32Array.from(cells), 1));
-  return new LineSegments(geometry, new LineBasicMaterial({ color: colour }));
-}
-
-function middleOf({ data, shape: [n, d] }) {
-  const [least, greatest] = [
-    [0, 0, 0],
-    [0, 0, 0],
-  ];
-  for (let axis = 0; axis < d; axis++) [least[axis], greatest[axis]] = [Infinity, -Infinity];
-  for (let row = 0; row < n; row++) {
-    for (let axis = 0; axis < d; axis++) {
-      least[axis] = Math.min(least[axis], data[row * d + axis]);
-      greatest[axis] = Math.max(greatest[axis], data[row * d + axis]);
-    }
-  }
-  return least.map((x, axis) => 0.5 * (x + greatest[axis]));
-}
-
-/** A fixed random order, so that its beginning is a sample of all points. */
-function shuffled(n) {
-  const order = Uint32Array.from({ length: n }, (_, at) => at);
-  const random = uniform(7);
-  for (let at = n - 1; at > 0; at--) {
-    const other = Math.floor(random() * (at + 1));
-    [order[at], order[other]] = [order[other], order[at]];
-  }
-  return order;
+/** Tells the materials of a graph how many pixels half the picture is high. */
+function setHeight(graph, pixels) {
+  graph.traverse((/** @type {any} */ { material }) => {
+    if (material?.uniforms?.height) material.uniforms.height.value = pixels;
+  });
 }

@@ -3,8 +3,9 @@
 
 mod output;
 mod progress;
+mod read;
 mod router;
-mod table;
+mod tensors;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -54,7 +55,7 @@ pub enum FileCommand {
 /// A cloud in a file, and where its answer goes.
 #[derive(clap::Args)]
 pub struct OfCloud {
-    /// A file of points: .ply, .npy, .json, or rows of numbers (.xyz, .csv, .txt).
+    #[arg(help = format!("A file of points: {}", read::formats::endings()), long_help = read::formats::help())]
     cloud: PathBuf,
     /// The file of the answer: .ply, .json or .safetensors, and for meshes .glb or .obj.
     #[arg(short, long)]
@@ -108,7 +109,7 @@ async fn answer(command: FileCommand, config: Config) -> Result<(), Failure> {
         FileCommand::Ask { operation, request, output } => {
             let accept = output.as_deref().map_or(Ok(JSON), media_type_of)?;
             let output = Output::prepare(output.as_deref(), &request)?;
-            let body = on_thread(move || read(&request)).await?;
+            let body = on_thread(move || bytes_in(&request)).await?;
             let answerer = Answerer::start(config).await?;
             output.write(answerer.compute(&format!("/v1/{operation}"), body, accept).await?).await
         }
@@ -131,9 +132,9 @@ async fn of_cloud(operation: &str, of: &OfCloud, config: Config) -> Result<(), F
     }
     let output = Output::prepare(Some(&of.output), &of.cloud)?;
     let cloud = of.cloud.clone();
-    let (media_type, body) = on_thread(move || cloud_in(&cloud)).await?;
+    let body = on_thread(move || cloud_in(&cloud)).await?;
     let answerer = Answerer::start(config).await?;
-    let cloud = answerer.register(media_type, body).await?;
+    let cloud = answerer.register(tensors::MEDIA_TYPE, body).await?;
     request.insert("cloud".to_owned(), json!({"id": cloud}));
     let body = Bytes::from(Value::Object(request).to_string());
     output.write(answerer.compute(&format!("/v1/{operation}"), body, accept).await?).await
@@ -147,18 +148,15 @@ async fn on_thread<T: Send + 'static>(
     done.map_err(|error| Failure::File(format!("a thread broke off: {error}")))?
 }
 
-/// The media type and the bytes of a cloud in a file.
-fn cloud_in(path: &Path) -> Result<(&'static str, Bytes), Failure> {
-    let bytes = read(path)?;
-    match ending(path).as_str() {
-        "ply" => Ok(("model/ply", bytes)),
-        "npy" => Ok(("application/x-npy", bytes)),
-        "json" => Ok((JSON, bytes)),
-        _ => {
-            let refused = |detail| Failure::File(format!("{}: {detail}", path.display()));
-            Ok(("application/x-safetensors", table::tensors_of(&bytes).map_err(refused)?.into()))
-        }
+/// The tensors of a cloud in a file.
+fn cloud_in(path: &Path) -> Result<Bytes, Failure> {
+    let refused = |detail: String| Failure::File(format!("{}: {detail}", path.display()));
+    let cloud = read::read(&path.to_string_lossy(), &bytes_in(path)?);
+    let cloud = cloud.map_err(|error| refused(error.to_string()))?;
+    if let Some(sentence) = cloud.left_out() {
+        eprintln!("gramian: {}: {sentence}", path.display());
     }
+    tensors::of(&cloud).map(Bytes::from).map_err(refused)
 }
 
 fn ending(path: &Path) -> String {
@@ -174,7 +172,7 @@ fn media_type_of(path: &Path) -> Result<&'static str, Failure> {
     })
 }
 
-fn read(path: &Path) -> Result<Bytes, Failure> {
+fn bytes_in(path: &Path) -> Result<Bytes, Failure> {
     let found = std::fs::read(path);
     found.map(Bytes::from).map_err(|error| Failure::File(format!("{}: {error}", path.display())))
 }

@@ -6,72 +6,16 @@
 
 import assert from "node:assert/strict";
 import { mkdirSync, readFileSync } from "node:fs";
-import { createRequire } from "node:module";
-import { after, before, test } from "node:test";
+import { before, test } from "node:test";
 
+import { base, DESK, open, opened, PHONE, require, settled, sphere, textOf } from "./browser.mjs";
 import { asked, HOSTILE } from "./running.mjs";
 
-const require = createRequire(`${process.cwd()}/target/sdk/node_modules/`);
-const { chromium } = require("playwright-core");
 const axe = readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
 
-const base = `${process.env.GRAMIAN_URL}/`;
 const pictures = "target/page";
 
-/** Without these, there is no WebGL where there is no graphics processor. */
-const GRAPHICS = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
-
-const DESK = { width: 1400, height: 900 };
-const PHONE = { width: 390, height: 800 };
-
-let browser;
-
-before(async () => {
-  mkdirSync(pictures, { recursive: true });
-  browser = await chromium.launch({ executablePath: "/usr/bin/chromium", args: ["--no-sandbox", ...GRAPHICS] });
-});
-after(() => browser.close());
-
-/**
- * Opens the page and calls `use`. Nothing may be logged as an error, asked of others, or against the policy.
- *
- * @param {string} hash
- * @param {(page: import("playwright-core").Page) => Promise<void>} use
- * @param {import("playwright-core").BrowserContextOptions & { expected?: string[] }} options
- */
-async function opened(hash, use, { viewport = DESK, expected = [], ...options } = {}) {
-  const context = await browser.newContext({ viewport, ...options });
-  const page = await context.newPage();
-  const wrong = [];
-  page.on("console", (message) => {
-    const text = message.text();
-    // Warnings of the software renderer are about itself.
-    if (message.type() === "error" && !expected.some((part) => text.includes(part))) wrong.push(text);
-  });
-  page.on("pageerror", (error) => wrong.push(error.stack));
-  page.on("request", (request) => {
-    if (!request.url().startsWith(base) && !/^(blob|data):/.test(request.url())) wrong.push(`asked ${request.url()}`);
-  });
-  try {
-    await page.goto(base + hash);
-    await use(page);
-    assert.deepEqual(wrong, []);
-  } finally {
-    await context.close();
-  }
-}
-
-function settled(page) {
-  return page.waitForSelector("body[data-state=settled]", { timeout: 120_000 });
-}
-
-/**
- * @param {import("playwright-core").Page} page
- * @param {string} selector
- */
-async function textOf(page, selector) {
-  return (await page.textContent(selector)) ?? "";
-}
+before(() => mkdirSync(pictures, { recursive: true }));
 
 /** Number of different colours in the picture, in a coarse raster. */
 async function nColours(page, name) {
@@ -90,22 +34,6 @@ async function nColours(page, name) {
       colours.add((data[at] >> 4) * 256 + (data[at + 1] >> 4) * 16 + (data[at + 2] >> 4));
     return colours.size;
   }, png.toString("base64"));
-}
-
-/** A sphere as an XYZ file. */
-function sphere(n) {
-  const rows = Array.from({ length: n }, (_, at) => {
-    const z = 1 - (2 * at + 1) / n;
-    const angle = at * Math.PI * (3 - Math.sqrt(5));
-    return [Math.sqrt(1 - z * z) * Math.cos(angle), Math.sqrt(1 - z * z) * Math.sin(angle), z].join(" ");
-  });
-  return rows.join("\n");
-}
-
-async function open(page, name, text) {
-  await page.setInputFiles("#file", { name, mimeType: "text/plain", buffer: Buffer.from(text) });
-  await page.waitForFunction((wanted) => document.querySelector("#cloud")?.textContent.startsWith(wanted), name);
-  await settled(page);
 }
 
 test("something beautiful shows before any click", () =>
@@ -262,9 +190,11 @@ test("a hostile link and a hostile file put nothing into the snippets", () => {
       ["TypeScript", "typescript"],
     ]) {
       await page.click(`#languages button:text-is("${title}")`);
-      const found = asked(language, await textOf(page, "#code"));
-      if (language === "python") assert.deepEqual(found[1], ["cloud", `${text}.ply`]);
-      else assert.equal(found[0][0], `${base}v1/curvatures`);
+      const found = asked(language, await textOf(page, "#code"), { [`${text}.ply`]: "the points" });
+      const [place, expected] = { python: [found[1][1], `./${text}.ply`], curl: [found[0][2], `${base}v1/clouds`] }[
+        language
+      ] ?? [found[0][0], `${base}v1/clouds`];
+      assert.equal(place, expected);
     }
   });
 });

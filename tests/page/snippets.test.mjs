@@ -6,9 +6,10 @@ import { readFileSync } from "node:fs";
 import { test } from "node:test";
 
 import { OPERATIONS, requestOf } from "../../page/model/operations.js";
-import { LANGUAGES, snippet } from "../../page/model/snippets.js";
+import { LANGUAGES, snippet, sourceOf } from "../../page/model/snippets.js";
 import { DEFAULTS, fromHash } from "../../page/model/state.js";
-import { asked, HOSTILE } from "./running.mjs";
+import { Tensor } from "../../page/model/tensors.js";
+import { asked, HOSTILE, ID } from "./running.mjs";
 
 const page = readFileSync(new URL("../../page/index.html", import.meta.url), "utf8");
 const {
@@ -24,24 +25,41 @@ const words = Object.fromEntries(
 );
 words.operation = Object.keys(OPERATIONS);
 
+/** A cloud of a file with points in space, too many to be in a snippet. */
+function cloudOf(name, n = 100, d = 3) {
+  return {
+    name,
+    points: new Tensor(
+      Float64Array.from({ length: d * n }, (_, at) => at),
+      [n, d],
+    ),
+    values: new Map(),
+  };
+}
+
+/** The words of a curl command for a POST of a media type. */
+const posted = (url, type) => ["--fail-with-body", "-sS", url, "-H", `Content-Type: ${type}`];
+
 /** Runs the snippets of a request in every language, and looks for the request in what they do. */
-function check({ address, fileName, operation = "curvatures", request, cloudId = "0".repeat(64) }) {
-  const url = `${address}${OPERATIONS[operation].path}`;
-  const body = { cloud: { id: cloudId }, ...request };
-  const of = (language) => asked(language, snippet(language, { address, cloudId, operation, request, fileName }));
-  const [[given, header, json, dash, sent]] = of("curl");
-  assert.deepEqual(
-    [given, header, json, dash, JSON.parse(sent)],
-    [url, "-H", "Content-Type: application/json", "-d", body],
-  );
-  const cloud = /\.ply$/.test(fileName) ? fileName : "...";
+function check({ address, fileName, operation = "curvatures", request }) {
+  const { path, method } = OPERATIONS[operation];
+  const source = sourceOf(cloudOf(fileName), true);
+  const { file = "", mediaType = "" } = source;
+  const of = (language) =>
+    asked(language, snippet(language, { address, operation, request, source }), { [file]: "the points" });
+  const body = { cloud: { id: ID }, ...request };
+  const [registered, computed] = of("curl");
+  assert.deepEqual(registered, [...posted(`${address}v1/clouds`, mediaType), "--data-binary", "@-", "the points"]);
+  assert.deepEqual(computed.slice(0, 8), [...posted(address + path, "application/json"), "-o", `${method}.json`, "-d"]);
+  assert.deepEqual(JSON.parse(computed[8]), body);
   assert.deepEqual(of("python"), [
     ["client", address.slice(0, -1)],
-    ["cloud", cloud],
-    [OPERATIONS[operation].method, request],
+    ["cloud", `./${file}`],
+    [method, request],
   ]);
-  const [[fetched, { method, body: text }]] = of("typescript");
-  assert.deepEqual([fetched, method, JSON.parse(text)], [url, "POST", body]);
+  const [[clouds, { body: points }], [fetched, { method: verb, body: text }]] = of("typescript");
+  assert.deepEqual([clouds, points, fetched, verb], [`${address}v1/clouds`, "the points", address + path, "POST"]);
+  assert.deepEqual(JSON.parse(text), body);
 }
 
 test("the words of the page are those of the document", () => {
@@ -79,13 +97,23 @@ test("snippets ask for what is on screen", () => {
     words,
   );
   check({ address: "http://localhost:8080/", fileName: "scan.ply", operation: "mesh", request: requestOf(settings) });
-  const quoted = snippet("python", {
-    address: "http://localhost:8080/",
-    operation: "mesh",
-    request: {},
-    fileName: "a\u202eb.ply",
-  });
-  assert.ok(quoted.includes('client.cloud("a\\u202eb.ply")'), quoted);
+  const source = sourceOf(cloudOf("a\u202eb.ply"), true);
+  const quoted = snippet("python", { address: "http://localhost:8080/", operation: "mesh", request: {}, source });
+  assert.ok(quoted.includes('client.cloud("./a\\u202eb.ply")'), quoted);
+});
+
+test("few points are in the snippet, others in a file that the service reads", () => {
+  const place = (cloud, isOwn) => {
+    const { inline, file, isMade } = sourceOf(cloud, isOwn);
+    return inline ? inline.points.length : [file, isMade];
+  };
+  assert.equal(place(cloudOf("ellipse", 64, 2), false), 64);
+  assert.deepEqual(place(cloudOf("half an ellipse", 256, 2), false), ["half-an-ellipse.json", true]);
+  assert.deepEqual(place(cloudOf("torus"), false), ["torus.ply", true]);
+  assert.deepEqual(place(cloudOf("scan.XYZ"), true), ["scan.ply", true]);
+  assert.deepEqual(place(cloudOf("scan.PLY"), true), ["scan.PLY", false]);
+  assert.deepEqual(place({ ...cloudOf("scan.ply"), nLeftOut: 3 }, true), ["scan.ply", true]);
+  assert.deepEqual(place(cloudOf("flat.npy", 100, 2), true), ["flat.npy", false]);
 });
 
 for (const language of Object.keys(LANGUAGES)) {
@@ -93,7 +121,8 @@ for (const language of Object.keys(LANGUAGES)) {
     for (const text of HOSTILE) {
       const hash = `#${new URLSearchParams({ solver: text, surfaceModel: text, family: text, operation: text })}`;
       const request = requestOf(fromHash(hash, words));
-      const given = { address: "http://localhost:8080/", cloudId: "0", operation: "curvatures", request };
+      const source = sourceOf(cloudOf("ball", 3), false);
+      const given = { address: "http://localhost:8080/", operation: "curvatures", request, source };
       assert.deepEqual(request, { include: ["std"] });
       assert.ok(asked(language, snippet(language, given)).length > 0);
     }
@@ -107,7 +136,6 @@ test("hostile names of files, servers and words are texts in every language", ()
       address,
       fileName: `${text}.ply`,
       request: { solver: text, kernel: { family: text, [text]: 1 } },
-      cloudId: text,
     });
     check({ address: "http://localhost:8080/", fileName: `${text}.csv`, request: { open: true, alpha: null } });
   }

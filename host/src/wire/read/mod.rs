@@ -5,9 +5,9 @@ pub mod body;
 pub mod limits;
 pub mod members;
 pub mod parse;
+pub mod ply;
 pub mod points;
 pub mod renamed;
+pub mod tensors;
 
-mod ply;
 mod reader;
-mod tensors;

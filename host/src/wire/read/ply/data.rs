@@ -5,7 +5,7 @@ use super::header::{Element, Encoding, Header, Kind, Property, Scalar, shown};
 
 /// Read position in the data. A copy reads the same records again.
 #[derive(Clone, Copy)]
-pub(super) struct Cursor<'a> {
+pub struct Cursor<'a> {
     rest: &'a [u8],
     encoding: Encoding,
     /// Lines of the file read so far, including the header.
@@ -20,12 +20,17 @@ enum Broken {
 }
 
 impl<'a> Cursor<'a> {
-    pub(super) fn new(data: &'a [u8], header: &Header<'_>) -> Self {
+    pub fn new(data: &'a [u8], header: &Header<'_>) -> Self {
         Self { rest: data, encoding: header.encoding, n_lines: header.n_lines }
     }
 
+    /// Lines of the file read so far, including the header. In binary, those of the header.
+    pub fn n_lines(&self) -> usize {
+        self.n_lines
+    }
+
     /// Skips all records of an element.
-    pub(super) fn skip(&mut self, element: &Element<'_>) -> Result<(), PlyError> {
+    pub fn skip(&mut self, element: &Element<'_>) -> Result<(), PlyError> {
         // Without properties the records take no bytes, whatever their number.
         let (n_least, n_records) =
             (self.least_bytes(element), if element.properties.is_empty() { 0 } else { element.count });
@@ -48,7 +53,7 @@ impl<'a> Cursor<'a> {
 
     /// Refuses a count for which the body has too few bytes. No memory is allocated on the word of a header
     /// alone.
-    pub(super) fn check_room(&self, element: &Element<'_>) -> Result<(), PlyError> {
+    pub fn check_room(&self, element: &Element<'_>) -> Result<(), PlyError> {
         let n_least = self.least_bytes(element);
         // The last line of a text needs no line end.
         let n_there = self.rest.len() + usize::from(self.encoding == Encoding::Text);
@@ -72,7 +77,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Reads a record and passes each number with the index of its property to `take`. Lists are skipped.
-    pub(super) fn record(
+    pub fn record(
         &mut self,
         element: &Element<'_>,
         index: usize,

@@ -3,15 +3,15 @@
 use super::{MAX_HEADER_BYTES, PlyError};
 
 /// A parsed header, with the elements in the order of the file.
-pub(super) struct Header<'a> {
-    pub(super) encoding: Encoding,
-    pub(super) elements: Vec<Element<'a>>,
+pub struct Header<'a> {
+    pub encoding: Encoding,
+    pub elements: Vec<Element<'a>>,
     /// Lines of the header, including the last one.
-    pub(super) n_lines: usize,
+    pub n_lines: usize,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Encoding {
+pub enum Encoding {
     Text,
     LittleEndian,
     BigEndian,
@@ -19,20 +19,20 @@ pub(super) enum Encoding {
 
 /// A group of `count` records with the same properties.
 #[derive(Clone)]
-pub(super) struct Element<'a> {
-    pub(super) name: &'a str,
-    pub(super) count: usize,
-    pub(super) properties: Vec<Property<'a>>,
+pub struct Element<'a> {
+    pub name: &'a str,
+    pub count: usize,
+    pub properties: Vec<Property<'a>>,
 }
 
 #[derive(Clone)]
-pub(super) struct Property<'a> {
-    name: &'a str,
-    pub(super) kind: Kind,
+pub struct Property<'a> {
+    pub name: &'a str,
+    pub kind: Kind,
 }
 
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Kind {
+pub enum Kind {
     Number(Scalar),
     /// A list: its length, then its entries.
     List {
@@ -43,7 +43,7 @@ pub(super) enum Kind {
 
 /// Scalar types of PLY. Each has two names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Scalar {
+pub enum Scalar {
     Int8,
     Uint8,
     Int16,
@@ -56,7 +56,7 @@ pub(super) enum Scalar {
 
 impl<'a> Header<'a> {
     /// Reads the header. Also returns the data that follows it.
-    pub(super) fn parse(bytes: &'a [u8]) -> Result<(Self, &'a [u8]), PlyError> {
+    pub fn parse(bytes: &'a [u8]) -> Result<(Self, &'a [u8]), PlyError> {
         let mut lines = Lines { rest: bytes, room: MAX_HEADER_BYTES, n_lines: 0 };
         if lines.next().is_none_or(|line| line != b"ply") {
             return Err(PlyError::NoMagic);
@@ -176,20 +176,20 @@ fn scalar_of(name: &str) -> Result<Scalar, String> {
 }
 
 /// Shortens a text that is repeated to the client.
-pub(super) fn shown(text: &str) -> String {
+pub fn shown(text: &str) -> String {
     text.chars().take(40).collect()
 }
 
 impl Element<'_> {
     /// The index of a number among the properties.
-    pub(super) fn column(&self, name: &str) -> Option<usize> {
+    pub fn column(&self, name: &str) -> Option<usize> {
         self.properties
             .iter()
             .position(|property| property.name == name && matches!(property.kind, Kind::Number(_)))
     }
 
     /// The indices of three numbers, if all are present.
-    pub(super) fn columns(&self, names: [&str; 3]) -> Option<[usize; 3]> {
+    pub fn columns(&self, names: [&str; 3]) -> Option<[usize; 3]> {
         let [x, y, z] = names.map(|name| self.column(name));
         Some([x?, y?, z?])
     }
@@ -197,7 +197,7 @@ impl Element<'_> {
 
 impl Scalar {
     /// Bytes of a number in binary.
-    pub(super) fn width(self) -> usize {
+    pub fn width(self) -> usize {
         match self {
             Self::Int8 | Self::Uint8 => 1,
             Self::Int16 | Self::Uint16 => 2,

@@ -8,8 +8,9 @@
 //! arrays. Crates that read PLY build a map or struct per vertex, and allocate by the counts of the header,
 //! which the client controls.
 
-mod data;
-mod header;
+pub mod data;
+pub mod header;
+
 mod rows;
 
 use super::parse::Document;
@@ -28,7 +29,7 @@ const NORMAL: [&str; 3] = ["nx", "ny", "nz"];
 
 /// Reason why a body is not valid PLY.
 #[derive(Debug, thiserror::Error)]
-enum PlyError {
+pub enum PlyError {
     #[error("the body is not PLY: its first line is not \"ply\"")]
     NoMagic,
     #[error("the header does not end: there is no line \"end_header\" in its first {MAX_HEADER_BYTES} bytes")]

@@ -2,7 +2,8 @@
 //!
 //! The same types read all formats, so every check and every pointer is the same.
 
-mod npy;
+pub mod npy;
+
 mod tensor;
 
 use std::borrow::Cow;

@@ -13,16 +13,16 @@ const MAX_RANK: usize = 64;
 ///
 /// The layout is: magic, version, length of the header, a Python dictionary with `descr`, `fortran_order` and
 /// `shape`, then the numbers.
-pub(super) struct Npy<'a> {
-    descr: &'a str,
-    fortran_order: bool,
-    shape: Vec<usize>,
-    data: &'a [u8],
+pub struct Npy<'a> {
+    pub descr: &'a str,
+    pub fortran_order: bool,
+    pub shape: Vec<usize>,
+    pub data: &'a [u8],
 }
 
 impl<'a> Npy<'a> {
     /// Returns `None` if the bytes are not npy, or if the header exceeds `max_header_bytes`.
-    pub(super) fn parse(bytes: &'a [u8], max_header_bytes: usize) -> Option<Self> {
+    pub fn parse(bytes: &'a [u8], max_header_bytes: usize) -> Option<Self> {
         let (version, rest) = bytes.strip_prefix(b"\x93NUMPY")?.split_at_checked(2)?;
         let (n_header, rest) = match version[0] {
             1 => rest.split_first_chunk().map(|(&n, rest)| (u16::from_le_bytes(n).into(), rest))?,

@@ -1,10 +1,7 @@
 //! The first line of a table, which decides the separator, the number of columns and what they are.
 
+use super::super::columns::POSITIONS;
 use super::numbers::{Numbers, Shape, is_decimal_comma, is_of_marks};
-
-/// Names of the columns of positions, and of normals as programs write them.
-const POSITIONS: [&str; 3] = ["x", "y", "z"];
-const NORMALS: [[&str; 3]; 2] = [["nx", "ny", "nz"], ["normal_x", "normal_y", "normal_z"]];
 
 /// A line of a file, counted from 1.
 #[derive(Clone, Copy)]
@@ -74,15 +71,6 @@ pub struct Head<'a> {
     cells: Vec<&'a str>,
 }
 
-/// Which columns are which, by their indices.
-pub struct Columns {
-    pub positions: Vec<usize>,
-    /// Normals by their names. In a table of six columns without names, the last three, which may be others.
-    pub normals: Option<Vec<usize>>,
-    /// Whether a column is one of positions or normals, which have no missing numbers.
-    pub is_geometric: Vec<bool>,
-}
-
 impl<'a> Head<'a> {
     pub fn of(line: Line<'a>) -> Self {
         let separator = Separator::of(line.text);
@@ -112,34 +100,30 @@ impl<'a> Head<'a> {
         self.cells.iter().enumerate().map(|(at, cell)| numbered(at, cell)).collect()
     }
 
-    /// Finds the columns by their names, or by their number if they have none.
+    /// The names of all columns. Columns without one are numbered.
     ///
     /// # Errors
     /// Refuses a table without x and y, and names that stand twice.
-    pub fn columns(&self) -> Result<Columns, String> {
-        let (line, width) = (self.line, self.width());
+    pub fn names(&self) -> Result<Vec<String>, String> {
+        let line = self.line;
+        let numbered = |at: usize| format!("column {}", at + 1);
         if !self.has_names {
-            if width < 2 {
+            if self.width() < 2 {
                 return Err(format!("line {line}: a row has at least two coordinates"));
             }
-            let positions: Vec<usize> = (0..width.min(3)).collect();
-            let is_geometric = (0..width).map(|column| column < 3).collect();
-            return Ok(Columns { positions, normals: (width == 6).then(|| vec![3, 4, 5]), is_geometric });
+            let name = |at| POSITIONS.get(at).map_or_else(|| numbered(at), |&axis| axis.to_owned());
+            return Ok((0..self.width()).map(name).collect());
         }
-        let names = self.lower_names();
-        if !has_positions(&names) {
+        let lower = self.lower_names();
+        if !has_positions(&lower) {
             return Err(format!("line {line} names no columns x and y: {}", self.cells.join(", ")));
         }
-        if let Some((_, twice)) = names.iter().enumerate().find(|(at, name)| names[..*at].contains(name)) {
+        if let Some((_, twice)) = lower.iter().enumerate().find(|(at, name)| lower[..*at].contains(name)) {
             return Err(format!("line {line} names {twice} twice"));
         }
-        let place = |name: &&str| names.iter().position(|other| other == name);
-        let positions: Vec<usize> = POSITIONS.iter().filter_map(place).collect();
-        let normals =
-            NORMALS.iter().find_map(|group| group.iter().take(positions.len()).map(place).collect());
-        let geometric = || POSITIONS.iter().chain(NORMALS.as_flattened());
-        let is_geometric = names.iter().map(|name| geometric().any(|other| other == name)).collect();
-        Ok(Columns { positions, normals, is_geometric })
+        let name =
+            |(at, cell): (usize, &&str)| if cell.is_empty() { numbered(at) } else { (*cell).to_owned() };
+        Ok(self.cells.iter().enumerate().map(name).collect())
     }
 
     /// Refuses a table whose commas can be read in two ways.
