@@ -6,7 +6,11 @@ import { inTurns } from "./turns.js";
 
 /** @import { Cloud } from "../types.d.ts" */
 
-/** @type {Record<string, { title: string, make: () => Cloud | Promise<Cloud> }>} */
+/**
+ * Examples by their names. Large ones are made beside the page.
+ *
+ * @type {Record<string, { title: string, make: () => Cloud | Promise<Cloud>, isLarge?: boolean }>}
+ */
 export const EXAMPLES = {
   dragon: { title: "Dragon, 12,000 points of a scan", make: dragon },
   torus: { title: "Torus, 2,000 random points", make: () => torus(2000) },
@@ -23,7 +27,7 @@ export const EXAMPLES = {
   ellipse: { title: "Ellipse, 64 points", make: () => ellipse(64, 0) },
   noisy: { title: "Ellipse with noise, 32 points", make: () => ellipse(32, 0.1) },
   noisier: { title: "Ellipse with more noise, 32 points", make: () => ellipse(32, 0.25) },
-  million: { title: "Torus, a million points", make: () => torus(1_000_000) },
+  million: { title: "Torus, a million points", make: () => torus(1_000_000), isLarge: true },
 };
 
 /** A generator of uniform numbers between 0 and 1 with a fixed seed (mulberry32). */

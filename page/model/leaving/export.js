@@ -1,8 +1,8 @@
 // @ts-check
 // Files that the page makes: PLY and CSV with the columns of a cloud, and the points alone as JSON.
 
-/** @import { Cloud, Column } from "../types.d.ts" */
-/** @import { Tensor } from "./tensors.js" */
+/** @import { Cloud, Column } from "../../types.d.ts" */
+/** @import { Tensor } from "../tensors.js" */
 
 /** Rows that are written at a time, so that the page answers meanwhile. */
 const BLOCK = 20_000;

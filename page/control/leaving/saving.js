@@ -1,12 +1,13 @@
 // @ts-check
 // Pictures and files that leave the page.
 
-import { OPERATIONS, requestOf } from "../model/operations.js";
-import { download } from "../model/service.js";
-import { element } from "../view/readout.js";
-import { all, at } from "./elements.js";
-import { page, scene } from "./page.js";
-import { idOf, refuse, repeated } from "./registered.js";
+import { OPERATIONS, requestOf } from "../../model/operations.js";
+import { download } from "../../model/service.js";
+import { element } from "../../view/readout.js";
+import { all, at } from "../elements.js";
+import { page, scene } from "../page.js";
+import { idOf, repeated } from "../registered.js";
+import { refuse } from "../../words/refusal.js";
 
 /** @type {Record<string, string>} */
 const SAVED = { ply: "model/ply", glb: "model/gltf-binary" };

@@ -2,9 +2,9 @@
 // The request on screen as a command or a program that runs as it is copied. Every text from a link, a file
 // or a server is quoted for its language.
 
-import { OPERATIONS } from "./operations.js";
+import { OPERATIONS } from "../operations.js";
 
-/** @import { Cloud, Source } from "../types.d.ts" */
+/** @import { Cloud, Source } from "../../types.d.ts" */
 
 export const LANGUAGES = { curl: "curl", python: "Python", typescript: "TypeScript" };
 

@@ -1,17 +1,17 @@
 // @ts-check
 // The request as code in each language, ready to be copied.
 
-import { cloudFile } from "../model/export.js";
-import { requestOf } from "../model/operations.js";
-import { savedKey } from "../model/service.js";
-import { KEY_VARIABLE, LANGUAGES, snippet, sourceOf } from "../model/snippets.js";
-import { toHash } from "../model/state.js";
-import { element } from "../view/readout.js";
-import { at } from "./elements.js";
-import { page } from "./page.js";
+import { cloudFile } from "../../model/leaving/export.js";
+import { requestOf } from "../../model/operations.js";
+import { savedKey } from "../../model/service.js";
+import { KEY_VARIABLE, LANGUAGES, snippet, sourceOf } from "../../model/leaving/snippets.js";
+import { toHash } from "../../model/state.js";
+import { element } from "../../view/readout.js";
+import { at } from "../elements.js";
+import { page } from "../page.js";
 import { offer } from "./saving.js";
 
-/** @import { Cloud, Source } from "../types.d.ts" */
+/** @import { Cloud, Source } from "../../types.d.ts" */
 
 /** @param {Record<string, any>} request */
 export function showRequest(request) {
