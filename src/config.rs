@@ -5,7 +5,7 @@ use std::time::Duration;
 use clap::Args;
 
 use crate::store::objects::Retention;
-use gramian_host::state::settings::{MAX_BYTES, MAX_COUNT, Settings, flag, whole};
+use gramian_host::state::settings::{MAX_COUNT, Settings, bytes, flag, whole};
 
 /// The configuration, read once in `main` and passed down.
 #[derive(Debug, Clone, clap::Args)]
@@ -15,11 +15,11 @@ pub struct Config {
 
     /// Bytes of this memory for cached factorizations and weights, an eighth of them for the next
     /// factorization. Less where work needs them.
-    #[arg(long, env = "GRAMIAN_CACHE_BYTES", default_value_t = 4 << 30)]
+    #[arg(long, env = "GRAMIAN_CACHE_BYTES", default_value = "4GiB", value_parser = bytes::<0, usize>)]
     pub cache_bytes: usize,
 
     /// Bytes of this memory for registered clouds, at most an eighth of all.
-    #[arg(long, env = "GRAMIAN_CLOUD_BYTES", default_value_t = 512 << 20)]
+    #[arg(long, env = "GRAMIAN_CLOUD_BYTES", default_value = "512MiB", value_parser = bytes::<0, usize>)]
     pub cloud_bytes: usize,
 
     /// Points a cloud may have, with any solver.
@@ -39,7 +39,7 @@ pub struct Config {
     pub max_dimension: usize,
 
     /// Bytes an answer may have, estimated at 25 bytes per number before anything is computed.
-    #[arg(long, env = "GRAMIAN_MAX_RESPONSE_BYTES", default_value_t = 1 << 30, value_parser = whole::<1, MAX_BYTES>)]
+    #[arg(long, env = "GRAMIAN_MAX_RESPONSE_BYTES", default_value = "1GiB", value_parser = bytes::<1, usize>)]
     pub max_response_bytes: usize,
 
     /// Whether the service is ready only while the store takes all clouds.
@@ -51,11 +51,11 @@ pub struct Config {
     pub store_days: Option<f64>,
 
     /// Bytes of clouds in the store. Beyond them the oldest are deleted. Absent: unlimited.
-    #[arg(long, env = "GRAMIAN_STORE_BYTES", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, env = "GRAMIAN_STORE_BYTES", value_parser = bytes::<1, u64>)]
     pub store_bytes: Option<u64>,
 
     /// Bytes of factorizations in the store. Beyond them the oldest are deleted. 0 keeps none.
-    #[arg(long, env = "GRAMIAN_STORE_FACTOR_BYTES", default_value_t = 16 << 30)]
+    #[arg(long, env = "GRAMIAN_STORE_FACTOR_BYTES", default_value = "16GiB", value_parser = bytes::<0, u64>)]
     pub store_factor_bytes: u64,
 }
 
@@ -66,13 +66,37 @@ impl Config {
         Retention { age, n_bytes: self.store_bytes, n_factor_bytes: self.store_factor_bytes }
     }
 
-    /// Returns the names that look like settings but are none, usually because of a typing error.
-    pub fn unknown_variables(names: impl Iterator<Item = String>) -> Vec<String> {
+    /// Returns the names that look like settings but are none, usually because of a typing error, each with
+    /// the nearest setting if one is near.
+    pub fn unknown_variables(names: impl Iterator<Item = String>) -> Vec<UnknownVariable> {
         let command = Self::augment_args(clap::Command::new("gramian"));
-        let is_known =
-            |name: &str| command.get_arguments().any(|arg| arg.get_env().is_some_and(|env| env == name));
-        names.filter(|name| name.starts_with("GRAMIAN_") && !is_known(name)).collect()
+        let settings: Vec<&str> =
+            command.get_arguments().filter_map(|arg| arg.get_env().and_then(|name| name.to_str())).collect();
+        let unknown = names.filter(|name| name.starts_with(PREFIX) && !settings.contains(&name.as_str()));
+        unknown.map(|name| UnknownVariable { nearest: nearest(&name, &settings), name }).collect()
     }
+}
+
+/// Beginning of the names of all settings in the environment.
+const PREFIX: &str = "GRAMIAN_";
+
+/// Least similarity (Jaro) of a mistyped name to the meant one, as clap has it for options.
+const LEAST_SIMILARITY: f64 = 0.7;
+
+/// A variable that looks like a setting and is none.
+#[derive(Debug, PartialEq, Eq)]
+pub struct UnknownVariable {
+    pub name: String,
+    /// The setting with the most similar name.
+    pub nearest: Option<String>,
+}
+
+/// The setting that is most similar to a name. The common beginning does not count.
+fn nearest(name: &str, settings: &[&str]) -> Option<String> {
+    let own = |name: &str| name.trim_start_matches(PREFIX).to_owned();
+    let similarity = |setting: &&str| (strsim::jaro(&own(name), &own(setting)), setting.to_string());
+    let best = settings.iter().map(similarity).max_by(|(a, _), (b, _)| a.total_cmp(b));
+    best.filter(|(similarity, _)| *similarity > LEAST_SIMILARITY).map(|(_, setting)| setting)
 }
 
 /// Parses days up to ten years, so that instants that far ahead are representable.
@@ -89,7 +113,16 @@ mod tests {
 
     #[test]
     fn mistyped_variables_are_found() {
-        let names = ["GRAMIAN_API_KEY", "GRAMIAN_API_KEYS", "GRAMIAN_BIND", "PATH"].map(str::to_owned);
-        assert_eq!(Config::unknown_variables(names.into_iter()), ["GRAMIAN_API_KEY"]);
+        let names =
+            ["GRAMIAN_API_KEY", "GRAMIAN_API_KEYS", "GRAMIAN_BIND", "PATH", "GRAMIAN_QQ", "GRAMIAN_CACHE"];
+        let found = Config::unknown_variables(names.map(str::to_owned).into_iter());
+        let found: Vec<_> =
+            found.iter().map(|found| (found.name.as_str(), found.nearest.as_deref())).collect();
+        let expected = [
+            ("GRAMIAN_API_KEY", Some("GRAMIAN_API_KEYS")),
+            ("GRAMIAN_QQ", None),
+            ("GRAMIAN_CACHE", Some("GRAMIAN_CACHE_BYTES")),
+        ];
+        assert_eq!(found, expected);
     }
 }

@@ -12,6 +12,7 @@ pub mod store;
 
 pub mod http;
 
+pub mod arguments;
 pub mod config;
 pub mod files;
 mod memory;

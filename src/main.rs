@@ -1,12 +1,14 @@
 //! Entry point: reads the configuration, then serves, answers a file, asks a running server whether it is
-//! ready, or makes a key.
+//! ready, makes a key, or prints completions.
 
+use std::io::Write;
+use std::net::SocketAddr;
 use std::process::ExitCode;
 
-use clap::Parser;
 use futures_util::future::OptionFuture;
-use gramian::config::Config;
-use gramian::files::{self, FileCommand};
+use gramian::arguments::{Arguments, Command, ServerArguments};
+use gramian::config::{Config, UnknownVariable};
+use gramian::files;
 use gramian::http;
 use gramian::http::serve::durable;
 use gramian::http::state::app::App;
@@ -25,47 +27,17 @@ const INTERRUPTED: i32 = 130;
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
-/// Geometric kernel interpolation and regression on point clouds, served over HTTP.
-#[derive(Parser)]
-#[command(version)]
-struct Arguments {
-    #[command(flatten)]
-    config: Config,
-    /// Serve until standard input is closed, then end as after SIGTERM. A program that starts the server
-    /// keeps a pipe to it, and the server ends with the program, even if that is killed.
-    #[arg(long)]
-    while_stdin: bool,
-    #[command(subcommand)]
-    command: Option<Command>,
-}
-
-#[derive(clap::Subcommand)]
-enum Command {
-    /// Exit with 0 if the server at GRAMIAN_BIND is ready.
-    Health,
-    /// Make a key, and the lines for the file of keys (GRAMIAN_KEYS_FILE) that let it in.
-    Key {
-        /// Name of its holder: letters, digits, '-' and '_'.
-        name: String,
-    },
-    #[command(flatten)]
-    File(FileCommand),
-}
-
 fn main() -> ExitCode {
     server::install_provider();
-    let Arguments { config, while_stdin, command } = Arguments::parse();
+    let Arguments { server: ServerArguments { config, while_stdin }, command } = Arguments::of_process();
     let outcome = match command {
-        Some(Command::Health) => {
-            match server::is_ready(config.host.bind, config.host.tls_certificate.is_some()) {
-                Ok(true) => Ok(()),
-                Ok(false) => Err("not ready".into()),
-                Err(error) => Err(error.into()),
-            }
-        }
+        Some(Command::Health) => check_health(config.host.bind).map_err(Into::into),
         Some(Command::File(command)) => return files::run(command, config),
         Some(Command::Key { name }) => make_key(&name).map_err(Into::into),
-        None => {
+        Some(Command::Completions { shell }) => {
+            std::io::stdout().write_all(&Arguments::completions(shell)).map_err(Into::into)
+        }
+        None | Some(Command::Serve) => {
             let log = telemetry::start();
             let served = runtime()
                 .map_err(Into::into)
@@ -80,6 +52,15 @@ fn main() -> ExitCode {
             eprintln!("gramian: {error}");
             ExitCode::FAILURE
         }
+    }
+}
+
+/// Asks the server at an address whether it is ready.
+fn check_health(bind: SocketAddr) -> Result<(), String> {
+    match server::is_ready(bind) {
+        Ok(true) => Ok(()),
+        Ok(false) => Err(format!("the server at {bind} is not ready: its log has the reason")),
+        Err(error) => Err(format!("no server answers at {bind} (GRAMIAN_BIND): {error}")),
     }
 }
 
@@ -101,9 +82,9 @@ fn runtime() -> std::io::Result<Runtime> {
 }
 
 async fn serve(config: Config, while_stdin: bool) -> Result<(), Box<dyn std::error::Error>> {
-    for name in Config::unknown_variables(std::env::vars_os().filter_map(|(name, _)| name.into_string().ok()))
-    {
-        tracing::warn!(name, "there is no such setting");
+    let names = std::env::vars_os().filter_map(|(name, _)| name.into_string().ok());
+    for UnknownVariable { name, nearest } in Config::unknown_variables(names) {
+        tracing::warn!(name, nearest, "there is no such setting; `gramian serve --help` lists all");
     }
     if config.host.is_exposed() && !config.host.allow_anonymous {
         let remedy =
@@ -132,8 +113,6 @@ async fn serve(config: Config, while_stdin: bool) -> Result<(), Box<dyn std::err
         });
     };
     let app = App::new(config).await?;
-    let (address, n_api_keys) = (listener.local_addr()?, app.keys.n_keys());
-    tracing::info!(%address, threads = app.settings.n_threads(), n_api_keys, "listening");
     tokio::spawn(durable::catch_up(app.clone()));
     tokio::spawn(durable::retain(app.clone()));
     tokio::spawn(app.keys.clone().follow_file());

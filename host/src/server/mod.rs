@@ -2,6 +2,7 @@
 
 mod accept;
 mod activity;
+mod address;
 mod body;
 mod connection;
 mod head;
@@ -13,7 +14,8 @@ mod tests;
 mod tls;
 
 use std::future::Future;
-use std::io;
+use std::io::{self, IsTerminal};
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -22,6 +24,7 @@ use axum::Router;
 use tokio::net::TcpListener;
 
 use crate::jobs::Runner;
+use crate::state::host::Host;
 use accept::{Acceptor, Connections, Door};
 use activity::Activity;
 use connection::ConnectionTimeouts;
@@ -58,6 +61,7 @@ pub async fn serve(
     };
     let following = tls.clone().map(|tls| tokio::spawn(tls.follow_files()));
     tokio::spawn(runner.go_round());
+    announce(&host, listener.local_addr()?, tls.is_some());
     let listening = Listening { router, tls, timeouts, limit: config.max_connections };
     let mut connections = listening.until(listener, stop).await;
     tracing::info!(n_connections = connections.len(), "draining");
@@ -86,6 +90,17 @@ pub async fn serve(
         following.abort();
     }
     Ok(())
+}
+
+/// Logs that connections are accepted from now on, and on a terminal shows the address to open. The log is
+/// for programs.
+fn announce(host: &Host, address: SocketAddr, speaks_tls: bool) {
+    let url = address::url(address, speaks_tls);
+    let (threads, n_api_keys) = (host.settings.n_threads(), host.keys.n_keys());
+    tracing::info!(%address, url, threads, n_api_keys, "listening");
+    if io::stdout().is_terminal() {
+        println!("gramian serves {url} until Ctrl-C");
+    }
 }
 
 /// Settings shared by all connections.

@@ -1,7 +1,7 @@
 //! A client for the readiness probe.
 
 use std::io::{self, Read, Write};
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpStream};
+use std::net::{Ipv4Addr, SocketAddr, TcpStream};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -12,25 +12,47 @@ use tokio_rustls::rustls::{
     ClientConfig, ClientConnection, DigitallySignedStruct, Error, SignatureScheme, StreamOwned,
 };
 
+use super::address::reachable;
 use super::tls;
 
-/// Returns whether a server at this address answers its readiness probe with 200 within two seconds, over TLS
-/// or plain.
+/// Time for each step of the probe.
+const TIMEOUT: Duration = Duration::from_secs(2);
+
+/// Returns whether a server at this address answers its readiness probe with 200. It is asked in plain HTTP
+/// first, then over TLS, so that the probe needs no setting of the server but its address.
 ///
 /// # Errors
 /// Returns errors of the connection.
-pub fn is_ready(bind: SocketAddr, speaks_tls: bool) -> io::Result<bool> {
-    let timeout = Duration::from_secs(2);
-    let stream = TcpStream::connect_timeout(&reachable(bind), timeout)?;
-    stream.set_read_timeout(Some(timeout))?;
-    stream.set_write_timeout(Some(timeout))?;
-    if speaks_tls { ask(over_tls(stream)?, bind) } else { ask(stream, bind) }
+pub fn is_ready(bind: SocketAddr) -> io::Result<bool> {
+    let connect = || -> io::Result<TcpStream> {
+        let stream = TcpStream::connect_timeout(&reachable(bind), TIMEOUT)?;
+        stream.set_read_timeout(Some(TIMEOUT))?;
+        stream.set_write_timeout(Some(TIMEOUT))?;
+        Ok(stream)
+    };
+    match ask(connect()?, bind) {
+        Err(error) if speaks_no_http(&error) => ask(over_tls(connect()?)?, bind),
+        answered => answered,
+    }
+}
+
+/// Whether a server closed the connection instead of an answer, or answered something else than HTTP, as one
+/// does that speaks TLS alone.
+fn speaks_no_http(error: &io::Error) -> bool {
+    use io::ErrorKind as Kind;
+    matches!(error.kind(), Kind::UnexpectedEof | Kind::InvalidData | Kind::ConnectionReset | Kind::BrokenPipe)
 }
 
 fn ask(mut stream: impl Read + Write, bind: SocketAddr) -> io::Result<bool> {
     write!(stream, "GET /health/ready HTTP/1.1\r\nHost: {bind}\r\nConnection: close\r\n\r\n")?;
     let mut status_line = [0; 12];
     stream.read_exact(&mut status_line)?;
+    if !status_line.starts_with(b"HTTP/") {
+        return Err(io::Error::new(
+            io::ErrorKind::InvalidData,
+            "what listens there speaks neither HTTP nor TLS",
+        ));
+    }
     Ok(&status_line[9..] == b"200")
 }
 
@@ -85,14 +107,4 @@ impl ServerCertVerifier for AnyCertificate {
     fn supported_verify_schemes(&self) -> Vec<SignatureScheme> {
         self.0.signature_verification_algorithms.supported_schemes()
     }
-}
-
-/// Returns the address to connect to. A server that listens on every address is asked on the loopback.
-fn reachable(bind: SocketAddr) -> SocketAddr {
-    let ip = match bind.ip() {
-        IpAddr::V4(ip) if ip.is_unspecified() => IpAddr::V4(Ipv4Addr::LOCALHOST),
-        IpAddr::V6(ip) if ip.is_unspecified() => IpAddr::V6(Ipv6Addr::LOCALHOST),
-        ip => ip,
-    };
-    SocketAddr::new(ip, bind.port())
 }

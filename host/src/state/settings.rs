@@ -3,12 +3,13 @@
 //! A setting that is blank, not a number or out of range ends the process at the start, with its name. A
 //! service that interprets a setting differently from its operator is worse than one that does not start.
 
-use std::net::SocketAddr;
+use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
 use axum::http::Uri;
+use parse_size::Config as Sizes;
 
 use crate::process::machine;
 use crate::store::Place;
@@ -16,21 +17,21 @@ use crate::store::Place;
 /// The settings of the host, read once at the start and passed down.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Settings {
-    /// Address and port to listen on.
-    #[arg(long, env = "GRAMIAN_BIND", default_value = "127.0.0.1:8080")]
+    /// Address and port to listen on, such as localhost:8080, or 0.0.0.0:8080 for all networks.
+    #[arg(long, env = "GRAMIAN_BIND", default_value = "127.0.0.1:8080", value_parser = address)]
     pub bind: SocketAddr,
 
     /// Compute threads, 0 for one per core.
     #[arg(long, env = "GRAMIAN_THREADS", default_value_t = 0, value_parser = whole::<0, 4096>)]
     pub threads: usize,
 
-    /// Bytes of memory for everything: bodies, clouds, factorizations, work and answers. Absent: three
-    /// quarters of the memory of the machine or the container.
+    /// Bytes of memory for everything, such as 4G: bodies, clouds, factorizations, work and answers. Absent:
+    /// three quarters of the memory of the machine or the container.
     #[arg(long, env = "GRAMIAN_MEMORY_BYTES", value_parser = enough_bytes)]
     pub memory_bytes: Option<usize>,
 
     /// Bytes a request body may have.
-    #[arg(long, env = "GRAMIAN_MAX_BODY_BYTES", default_value_t = 256 << 20, value_parser = whole::<1, MAX_BYTES>)]
+    #[arg(long, env = "GRAMIAN_MAX_BODY_BYTES", default_value = "256MiB", value_parser = bytes::<1, usize>)]
     pub max_body_bytes: usize,
 
     /// Compute requests that may wait for a thread. The next one is answered 503.
@@ -105,7 +106,7 @@ pub struct Settings {
 
     /// Bytes of jobs and their results in the store. One of several keys may have half of them. Results
     /// beyond them are refused.
-    #[arg(long, env = "GRAMIAN_STORE_JOB_BYTES", default_value_t = 16 << 30, value_parser = whole::<1, MAX_BYTES>)]
+    #[arg(long, env = "GRAMIAN_STORE_JOB_BYTES", default_value = "16GiB", value_parser = bytes::<1, usize>)]
     pub store_job_bytes: usize,
 
     /// Origins that browsers may call from, separated by commas, or `*`.
@@ -181,9 +182,9 @@ impl Settings {
 
 /// Parses a number of bytes, at least as many as the process needs to answer at all.
 fn enough_bytes(text: &str) -> Result<usize, String> {
-    match text.parse::<usize>() {
-        Ok(bytes) if bytes >= machine::LEAST_BYTES => Ok(bytes),
-        _ => Err(format!("must be a number of bytes, at least {}", machine::LEAST_BYTES)),
+    match bytes::<1, _>(text)? {
+        bytes if bytes >= machine::LEAST_BYTES => Ok(bytes),
+        _ => Err(format!("must be at least {}MiB, such as 4G", machine::LEAST_BYTES.div_ceil(1 << 20))),
     }
 }
 
@@ -199,6 +200,30 @@ pub fn whole<const MIN: u64, const MAX: u64>(text: &str) -> Result<usize, String
     let number = text.parse::<u64>().ok().filter(|number| (MIN..=MAX).contains(number));
     let number = number.and_then(|number| usize::try_from(number).ok());
     number.ok_or_else(|| format!("must be a whole number from {MIN} to {MAX}"))
+}
+
+/// Parses a number of bytes with or without a unit, of which K, M, G and T are powers of 1024.
+///
+/// # Errors
+/// Tells the bounds, with an example.
+pub fn bytes<const MIN: u64, T: TryFrom<u64>>(text: &str) -> Result<T, String> {
+    let bytes = Sizes::new().with_binary().parse_size(text).ok();
+    let bytes = bytes.filter(|bytes| (MIN..=MAX_BYTES).contains(bytes));
+    let bytes = bytes.and_then(|bytes| T::try_from(bytes).ok());
+    bytes.ok_or_else(|| format!("must be a number of bytes from {MIN} to {MAX_BYTES}, such as 512MiB or 4G"))
+}
+
+/// Parses an IP address, or `localhost`, with a port. Other names are not resolved: they may be those of
+/// several addresses, and others the next day.
+fn address(text: &str) -> Result<SocketAddr, String> {
+    let port = text.strip_prefix("localhost:").and_then(|port| port.parse().ok());
+    let address =
+        port.map(|port| SocketAddr::from((Ipv4Addr::LOCALHOST, port))).or_else(|| text.parse().ok());
+    address.ok_or_else(|| {
+        "must be an IP address and a port, such as 127.0.0.1:8080 or localhost:8080 for this machine alone, or \
+         0.0.0.0:8080 for all networks"
+            .to_owned()
+    })
 }
 
 /// Parses `1` and `0` as well as `true` and `false`.
@@ -217,7 +242,7 @@ pub fn flag(text: &str) -> Result<bool, String> {
 fn positive_seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds > 0.0 && seconds <= 3e8 => Ok(seconds),
-        _ => Err("must be a positive number of seconds, at most 3e8".to_owned()),
+        _ => Err("must be a positive number of seconds, at most 3e8, such as 30 or 0.5".to_owned()),
     }
 }
 
@@ -317,6 +342,24 @@ mod tests {
             "https://ä.example",
         ] {
             assert!(bad.parse::<Origins>().is_err(), "{bad:?} is taken");
+        }
+    }
+
+    #[test]
+    fn sizes_have_units_and_localhost_is_an_address() {
+        let body = |text: &str| settings(&["--max-body-bytes", text]).map(|settings| settings.max_body_bytes);
+        for (text, expected) in
+            [("4G", 4 << 30), ("512MiB", 512 << 20), ("1.5k", 1536), ("2 GB", 2 << 30), ("17", 17)]
+        {
+            assert_eq!(body(text), Ok(expected), "{text}");
+        }
+        for bad in ["", " ", "0", "-1", "4 apples", "1e30", "9999P"] {
+            assert!(body(bad).unwrap_err().contains("such as 512MiB or 4G"), "{bad:?}");
+        }
+        let bind = |text: &str| settings(&["--bind", text]).map(|settings| settings.bind.to_string());
+        assert_eq!(bind("localhost:9000").as_deref(), Ok("127.0.0.1:9000"));
+        for bad in ["localhost", "8080", ":8080", "example.org:80", "localhost:99999"] {
+            assert!(bind(bad).unwrap_err().contains("localhost:8080"), "{bad:?}");
         }
     }
 

@@ -67,9 +67,22 @@ fn the_log_counts_keys_and_names_unknown_settings() {
         process.terminate();
         let lines = process.finish().1;
         assert_eq!(logged(&lines, "listening")["n_api_keys"], n_keys);
-        assert_eq!(logged(&lines, "no such setting")["name"], "GRAMIAN_API_KEY");
+        let unknown = logged(&lines, "no such setting");
+        assert_eq!(
+            (&unknown["name"], &unknown["nearest"]),
+            (&json!("GRAMIAN_API_KEY"), &json!("GRAMIAN_API_KEYS"))
+        );
         assert!(!lines.join("\n").contains("mistyped"));
     }
+}
+
+#[tokio::test]
+async fn the_log_has_an_address_to_open() {
+    let process = Process::of(gramian().args(["--bind", "0.0.0.0:0"]).env("GRAMIAN_ALLOW_ANONYMOUS", "1"));
+    let port = process.address().rsplit(':').next().unwrap().to_owned();
+    let url = logged(&process.lines.lock().unwrap(), "listening")["url"].as_str().unwrap().to_owned();
+    assert_eq!(url, format!("http://127.0.0.1:{port}/"));
+    assert_eq!(receive(unpooled().get(url)).await.status, 200);
 }
 
 #[tokio::test]

@@ -1,7 +1,7 @@
 //! Settings of the process: variables, flags and refusals.
 
 use std::io::{BufRead, BufReader};
-use std::process::Stdio;
+use std::process::{Output, Stdio};
 
 use serde_json::json;
 
@@ -10,7 +10,7 @@ use crate::support::{receive, unpooled};
 
 #[tokio::test]
 async fn every_setting_has_a_variable_and_a_flag_which_wins() {
-    let help = gramian().arg("--help").env("GRAMIAN_API_KEYS", "secret-key").output().unwrap();
+    let help = gramian().args(["serve", "--help"]).env("GRAMIAN_API_KEYS", "secret-key").output().unwrap();
     let help = String::from_utf8(help.stdout).unwrap();
     for name in [
         "BIND",
@@ -115,6 +115,56 @@ fn a_setting_that_makes_no_sense_ends_the_process_with_its_name() {
         assert_eq!(child.wait().unwrap().code(), Some(2), "{name}={value}: {text}");
         let flag = format!("--{}", name.to_lowercase().replace('_', "-"));
         assert!(text.contains(&flag), "{name}={value}: {text}");
+    }
+}
+
+/// Returns what a process that ends at once writes to standard error.
+fn told(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn the_help_shows_commands_first_and_settings_under_serve() {
+    let help = gramian().arg("--help").output().unwrap();
+    let help = String::from_utf8(help.stdout).unwrap();
+    let commands = ["normals", "curvatures", "mesh", "ask", "serve", "health", "key", "completions"];
+    let places = commands.map(|command| help.find(&format!("\n  {command} ")).expect(command));
+    assert!(places.is_sorted(), "{help}");
+    assert!(help.contains("gramian serve --help") && !help.contains("--bind"), "{help}");
+    for shell in ["bash", "zsh", "fish"] {
+        let completions = gramian().args(["completions", shell]).output().unwrap();
+        let text = String::from_utf8(completions.stdout).unwrap();
+        assert!(completions.status.success() && text.contains("curvatures"), "{shell}: {text}");
+    }
+}
+
+#[tokio::test]
+async fn sizes_and_localhost_are_understood_by_serve() {
+    let mut command = gramian();
+    command.args(["serve", "--bind", "localhost:0", "--memory-bytes", "1G", "--max-body-bytes", "1.5k"]);
+    let process = Process::of(command.env("GRAMIAN_CACHE_BYTES", "128MiB"));
+    let answer = receive(unpooled().post(process.url("/v1/curvatures")).json(&curvatures(300))).await;
+    assert_eq!((answer.status, &answer.json().unwrap()["limit"]), (413, &json!(1536)));
+}
+
+#[test]
+fn mistyped_settings_are_answered_with_the_nearest_and_values_with_an_example() {
+    let option = told(&gramian().args(["--max-point", "5"]).output().unwrap());
+    assert!(option.contains("'--max-points'"), "{option}");
+    let command = told(&gramian().arg("serv").output().unwrap());
+    assert!(command.contains("'serve'"), "{command}");
+    for (name, value, example) in [
+        ("BIND", "8080", "localhost:8080"),
+        ("BIND", "example.org:8080", "0.0.0.0:8080"),
+        ("CACHE_BYTES", "much", "512MiB or 4G"),
+        ("MEMORY_BYTES", "1M", "4G"),
+        ("STORE_BYTES", "4 apples", "512MiB or 4G"),
+    ] {
+        let text = told(&gramian().env(format!("GRAMIAN_{name}"), value).output().unwrap());
+        assert!(text.contains(example) && text.contains(&format!("variable GRAMIAN_{name}")), "{text}");
+        let flag = format!("--{}", name.to_lowercase().replace('_', "-"));
+        let text = told(&gramian().args([&flag, value]).output().unwrap());
+        assert!(text.contains(example) && !text.contains("variable GRAMIAN"), "{text}");
     }
 }
 

@@ -129,8 +129,26 @@ async fn the_probe_asks_over_tls_whatever_the_files_have() {
     // The server continues with the certificate that it has read.
     fs::write(files.path("certificate"), "half a certifi").unwrap();
     assert!(probe(&files).status.success());
-    let in_plain = gramian().args(["--bind", process.address(), "health"]).output().unwrap();
-    assert!(!in_plain.status.success());
+    // The address is enough.
+    let without_files = gramian().args(["health", "--bind", process.address()]).output().unwrap();
+    assert!(without_files.status.success());
+}
+
+#[test]
+fn the_probe_tells_where_it_asked_in_vain() {
+    // The first server accepts connections and closes them. It speaks neither HTTP nor TLS.
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    let ask = || gramian().args(["health", "--bind", &address]).output().unwrap();
+    let closing = std::thread::spawn(move || (0..2).for_each(|_| drop(listener.accept())));
+    for output in [ask(), ask()] {
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert!(
+            !output.status.success() && told.contains(&address) && told.contains("GRAMIAN_BIND"),
+            "{told}"
+        );
+    }
+    closing.join().unwrap();
 }
 
 #[tokio::test]
@@ -143,7 +161,8 @@ async fn a_certificate_that_is_none_ends_the_start() {
         fs::write(files.path(name), text).unwrap();
         let ended = gramian().args(["--bind", "127.0.0.1:0"]).args(files.flags()).output().unwrap();
         assert!(!ended.status.success());
-        assert!(String::from_utf8(ended.stderr).unwrap().contains(told));
+        let text = String::from_utf8(ended.stderr).unwrap();
+        assert!(text.contains(told) && !text.contains("listening"), "{text}");
     }
     let half = gramian().args(["--tls-key", "x"]).output().unwrap();
     assert!(!half.status.success() && String::from_utf8(half.stderr).unwrap().contains("--tls-certificate"));
