@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 
 import numpy as np
@@ -12,6 +13,14 @@ from gramian.wire.tensors import Array
 @pytest.fixture(autouse=True)
 def _names_of_doctests(doctest_namespace: dict[str, object]) -> None:
     doctest_namespace.update(gramian=gramian, np=np)
+
+
+@pytest.fixture(autouse=True)
+def _figures() -> Iterator[None]:
+    """Closes the figures of a test. pyplot keeps them otherwise, and warns when there are many."""
+    yield
+    if "matplotlib.pyplot" in sys.modules:
+        sys.modules["matplotlib.pyplot"].close("all")
 
 
 @pytest.fixture

@@ -289,8 +289,9 @@ BAD_ROWS: dict[str, tuple[Any, type[Exception], str]] = {
 def test_other_things_than_rows_of_numbers_are_refused_by_name(
     rows: object, kind: type[Exception], message: str
 ) -> None:
-    with pytest.raises(kind, match="^" + message.format("points")):
-        posted(rows)
+    if not isinstance(rows, str):  # the path of a file, for points alone
+        with pytest.raises(kind, match="^" + message.format("points")):
+            posted(rows)
     if not hasattr(rows, "__next__"):
         with pytest.raises(kind, match="^" + message.format("normals")):
             posted(CIRCLE, rows)

@@ -107,7 +107,7 @@ def test_a_server_that_is_not_there_is_named() -> None:
     (note,) = caught.value.__notes__
     first, *ways = note.splitlines()
     assert first == f"No service answers at {address}. Three ways on:"
-    expected = ["gramian.local()", f"gramian --bind {address.removeprefix('http://')}", "GRAMIAN_URL"]
+    expected = ["gramian.local()", f"gramian serve --bind {address.removeprefix('http://')}", "GRAMIAN_URL"]
     assert all(part in way for part, way in zip(expected, ways, strict=True))
 
 

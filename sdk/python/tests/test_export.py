@@ -78,7 +78,6 @@ def test_every_answer_prints_and_draws_itself(method: str) -> None:
     assert display.figure_ is display.axes_.figure
     assert display.axes_.get_xlabel()
     assert display.axes_.get_ylabel()
-    mpl.pyplot.close("all")
 
 
 def test_a_selection_prints_its_model(cloud: Any) -> None:

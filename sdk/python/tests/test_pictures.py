@@ -155,13 +155,16 @@ def test_a_likelihood_is_shown_where_it_matters() -> None:
     assert found.alpha_path.plot().axes_.get_ylabel() == "score"
 
 
-def test_positions_that_are_not_known_are_asked_for(tmp_path: Path) -> None:
+def test_a_cloud_of_a_file_draws_itself(tmp_path: Path) -> None:
     path = tmp_path / "sphere.ply"
     head = (
         "ply\nformat ascii 1.0\nelement vertex 100\nproperty double x\nproperty double y\nproperty double z\nend_header"
     )
     np.savetxt(path, sphere(100), header=head, comments="")
-    normals = gramian.Client().cloud(path).normals()
+    display = gramian.Client().cloud(path).normals().plot()
+    assert display.positions.shape == (100, 3)
+    # The service reads bytes, so the client has no positions.
+    normals = gramian.Client().cloud(path.read_bytes()).normals()
     with pytest.raises(ValueError, match="positions=points"):
         normals.plot()
     assert normals.plot(positions=sphere(100)).positions.shape == (100, 3)

@@ -168,6 +168,6 @@ def _advice(error: httpx.TransportError, url: httpx.URL) -> str:
 WAYS_ON = """\
 No service answers at {url}. Three ways on:
  - Let this package start one: gramian.cloud(points) without GRAMIAN_URL, or with gramian.local() as client.
- - Start one in a terminal, with the program of this package: gramian --bind {host}
+ - Start one in a terminal, with the program of this package: gramian serve --bind {host}
  - Name another: gramian.Client("http://…"), or the environment variable GRAMIAN_URL."""
 """Advice if nothing listens at an address."""
