@@ -8,8 +8,9 @@ import { change, events, page, scene, WORDS } from "./control/page.js";
 import { histogram, showPicture } from "./control/picture.js";
 import "./control/pointer.js";
 import { chosen, rangeNow } from "./control/range.js";
-import "./control/saving.js";
-import { fillForm, keepInLink } from "./control/settings.js";
+import "./control/leaving/saving.js";
+import { fillForm, isStep, keepInLink } from "./control/settings.js";
+import { requestOf } from "./model/operations.js";
 import { saveKey, savedKey } from "./model/service.js";
 import { DEFAULTS, fromHash } from "./model/state.js";
 
@@ -42,7 +43,8 @@ events.addEventListener("settings", (event) => {
 });
 
 form.addEventListener("input", (event) => {
-  const { name, type, checked, value } = /** @type {HTMLInputElement} */ (event.target);
+  const field = /** @type {HTMLInputElement} */ (event.target);
+  const { name, type, checked, value } = field;
   if (!(name in DEFAULTS)) return;
   const kind = typeof DEFAULTS[name];
   const given = type === "checkbox" ? checked : kind === "number" ? Number(value) : value;
@@ -52,10 +54,12 @@ form.addEventListener("input", (event) => {
   if (isEnd && value === "") return;
   const { low, high } = isEnd ? rangeNow(chosen()) : {};
   const own = isEnd ? { range: "own", low, high } : {};
-  change({ ...own, [name]: given }, { isPush: ["example", "operation"].includes(name) });
+  change({ ...own, [name]: given }, { isPush: isStep(field) });
 });
 form.addEventListener("submit", (event) => event.preventDefault());
-at("bySupport").addEventListener("change", () => change({ colour: at("bySupport").checked ? "support" : "quantity" }));
+at("bySupport").addEventListener("change", () =>
+  change({ colour: at("bySupport").checked ? "support" : "quantity" }, { isPush: true }),
+);
 at("key").value = savedKey();
 at("key").addEventListener("change", () => {
   saveKey(at("key").value);
@@ -72,11 +76,9 @@ function isSmall() {
 function logarithmic(slider, name, settingOf) {
   const apply = () => {
     const value = Number(settingOf(Number(slider.value)).toPrecision(3));
-    change(
-      name === "lengthScale" && page.settings.family === "auto"
-        ? { lengthScale: value, family: "gauss" }
-        : { [name]: value },
-    );
+    const isKernel = name === "lengthScale" && page.settings.family === "auto";
+    const changed = isKernel ? { lengthScale: value, family: "gauss" } : { [name]: value };
+    change(changed, { isPush: isStep(slider) });
   };
   slider.addEventListener("input", () => isSmall() && apply());
   slider.addEventListener("change", apply);
@@ -89,8 +91,11 @@ window.addEventListener("popstate", () => {
   const before = page.settings;
   page.settings = fromHash(location.hash, WORDS);
   fillForm();
-  if (before.example !== page.settings.example) loadExample();
-  else ask();
+  const isOf = (settings) => [settings.example, settings.fileName, settings.operation, requestOf(settings)];
+  const [[example, file, ...asked], [example2, file2, ...asked2]] = [before, page.settings].map(isOf);
+  if (example !== example2 || file !== file2) loadExample();
+  else if (JSON.stringify(asked) !== JSON.stringify(asked2)) ask();
+  else showPicture(page.settings);
 });
 const dark = window.matchMedia("(prefers-color-scheme: dark)");
 const paint = () => {

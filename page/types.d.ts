@@ -17,6 +17,22 @@ export interface Cloud {
   exact?: number[][];
   /** The answer to the first question, which comes with the cloud. */
   known?: Answer;
+  /** The name of the example. Absent for files. */
+  example?: string;
+  /** Rows that are equal to earlier ones. */
+  repeats?: Uint32Array;
+}
+
+/** A cloud of a file with what stands in the way of computing with it. */
+export interface ReadCloud extends Cloud {
+  /** Rows without a position. */
+  gaps?: Uint32Array;
+  /** Rows whose normal has no direction. */
+  undirected?: Uint32Array;
+  /** Columns of text, which were left out. */
+  textColumns?: string[];
+  /** What the strict reader refused. */
+  strictly?: string;
 }
 
 export interface Answer {
@@ -43,7 +59,7 @@ export interface Diagnostics {
   kernel?: Record<string, string | number>;
   alpha?: number;
   reciprocal_condition?: number;
-  warnings?: { detail: string }[];
+  warnings?: { code?: string; detail: string }[];
 }
 
 /** Numbers of all points under a name, as files have them. */
@@ -118,20 +134,27 @@ export interface Problem {
   title: string;
   detail: string;
   status?: number;
+  instance?: string;
+  point_indices?: number[];
+  limit?: number;
+  required?: number;
   minimum_alpha?: number;
   errors?: { pointer: string }[];
 }
 
-/** What can be done about a refusal: a label, and the settings that it sets. */
+/** What can be done about a refusal: a label, and the settings that it sets or the event that it causes. */
 export interface Remedy {
   label: string;
-  set: Partial<Settings>;
+  set?: Partial<Settings>;
+  act?: string;
 }
 
 /** Everything that the page remembers. */
 export interface PageState {
   settings: Settings;
   cloud?: Cloud;
+  /** The cloud of the file that was opened last. */
+  own?: Cloud;
   /** The id of the cloud, once it is registered. */
   cloudId?: string;
   answer?: Answer;
@@ -157,12 +180,15 @@ export interface PageState {
 export interface Elements {
   settings: HTMLFormElement;
   cloud: HTMLElement;
+  cleaning: HTMLElement;
   file: HTMLInputElement;
   bySupport: HTMLInputElement;
   scaleSlider: HTMLInputElement;
   alphaSlider: HTMLInputElement;
   hideText: HTMLElement;
   key: HTMLInputElement;
+  keyPart: HTMLDetailsElement;
+  keyHint: HTMLElement;
   scene: HTMLCanvasElement;
   scale: HTMLElement;
   tip: HTMLElement;

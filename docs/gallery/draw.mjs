@@ -1,7 +1,7 @@
 // @ts-check
 // Draws the figures of the paper: opens each scene on the page of the server at GRAMIAN_URL, saves its
-// picture beside this file, and writes docs/gallery.md with links to the scenes. Also draws docs/page.png,
-// the page as it opens.
+// picture beside this file, and writes docs/gallery.md with links to the scenes. Then draws the pictures of
+// docs/page.md. With the argument `page` it draws those alone.
 
 import { writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
@@ -51,24 +51,52 @@ const SCENES = [
 
 const GRAPHICS = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
 
+/**
+ * Pictures of the page by name: the scene, the size of the window, and the colours.
+ *
+ * @type {[string, string, { width: number, height: number }, "light" | "dark"][]}
+ */
+const PAGES = [
+  ["page", "", { width: 1400, height: 800 }, "light"],
+  ["page-dark", "", { width: 1400, height: 800 }, "dark"],
+  ["page-phone", "", { width: 390, height: 844 }, "light"],
+  ["page-million", "example=million&std=true", { width: 1400, height: 800 }, "light"],
+];
+
+/** Time for a million points on a slow machine, in milliseconds. */
+const PATIENCE = 600_000;
+
 const browser = await chromium.launch({ executablePath: "/usr/bin/chromium", args: ["--no-sandbox", ...GRAPHICS] });
-const page = await browser.newPage({ viewport: { width: 1200, height: 640 } });
-for (const [name, hash] of SCENES) {
-  await page.goto("about:blank");
+
+/**
+ * Opens a scene, and waits until it has been drawn.
+ *
+ * @param {string} name
+ * @param {string} hash
+ * @param {import("playwright-core").BrowserContextOptions} options
+ * @param {(page: import("playwright-core").Page) => Promise<unknown>} draw
+ */
+async function drawn(name, hash, options, draw) {
+  const page = await browser.newPage(options);
   await page.goto(`${base}#${hash}`);
-  await page.waitForSelector("body[data-state=settled]", { timeout: 120_000 });
+  await page.waitForSelector("body[data-state=settled]", { timeout: PATIENCE });
   await page.waitForLoadState("networkidle");
-  await page.waitForTimeout(300);
-  await page.locator("#scene").screenshot({ path: `docs/gallery/${name}.png` });
+  await page.waitForTimeout(1000);
   if (await page.isVisible("#refusal")) throw new Error(`${name}: ${await page.textContent("#refusal")}`);
+  await draw(page);
+  await page.close();
   console.log(name);
 }
-await page.setViewportSize({ width: 1400, height: 800 });
-await page.goto("about:blank");
-await page.goto(base);
-await page.waitForSelector("body[data-state=settled]", { timeout: 120_000 });
-await page.waitForTimeout(1000);
-await page.screenshot({ path: "docs/page.png" });
+
+const areAll = process.argv[2] !== "page";
+for (const [name, hash] of areAll ? SCENES : []) {
+  await drawn(name, hash, { viewport: { width: 1200, height: 640 } }, (page) =>
+    page.locator("#scene").screenshot({ path: `docs/gallery/${name}.png` }),
+  );
+}
+for (const [name, hash, viewport, colorScheme] of PAGES) {
+  await drawn(name, hash, { viewport, colorScheme }, (page) => page.screenshot({ path: `docs/${name}.png` }));
+}
 await browser.close();
 
 const rows = SCENES.map(

@@ -4,14 +4,27 @@
 import { OPERATIONS, requestOf } from "../model/operations.js";
 import { compute } from "../model/service.js";
 import { at } from "./elements.js";
-import { page } from "./page.js";
+import { events, page } from "./page.js";
 import { showAnswer } from "./picture.js";
-import { idOf, refuse, repeated } from "./registered.js";
-import { showRequest } from "./request.js";
+import { idOf, repeated } from "./registered.js";
+import { refuse } from "../words/refusal.js";
+import { showRequest } from "./leaving/request.js";
 
-/** @import { Progress } from "../types.d.ts" */
+events.addEventListener("again", () => ask());
 
-/** Asks the service. A later question ends an earlier one. */
+/** @import { Answer, Cloud, Progress } from "../types.d.ts" */
+
+/** Answers that are kept for each cloud, for those who go back to earlier settings. */
+const KEPT = 6;
+
+/**
+ * Answers by their requests, in the order of their arrival.
+ *
+ * @type {WeakMap<Cloud, Map<string, Answer>>}
+ */
+const answers = new WeakMap();
+
+/** Asks the service. A later question ends an earlier one. Answers that are still known are shown again. */
 export async function ask() {
   page.asking?.abort();
   const asking = new AbortController();
@@ -21,10 +34,22 @@ export async function ask() {
   const request = requestOf(settings);
   showRequest(request);
   at("refusal").hidden = true;
+  const kept = answers.get(cloud) ?? new Map();
+  answers.set(cloud, kept);
+  const name = `${settings.operation} ${JSON.stringify(request)}`;
+  if (kept.has(name)) {
+    at("progress").hidden = true;
+    document.body.dataset.state = "asking";
+    await showAnswer(kept.get(name), { isNew: settings.operation !== page.shown });
+    if (page.asking === asking) document.body.dataset.state = "settled";
+    return;
+  }
   document.body.dataset.state = "asking";
   const timer = setTimeout(() => showProgress({}), 250);
   try {
     const answer = await withCloud(cloud, request, asking.signal);
+    kept.set(name, answer);
+    for (const oldest of [...kept.keys()].slice(0, -KEPT)) kept.delete(oldest);
     if (page.asking === asking) await showAnswer(answer, { isNew: settings.operation !== page.shown });
   } catch (error) {
     if (!asking.signal.aborted) refuse(error);

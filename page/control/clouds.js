@@ -2,28 +2,61 @@
 // Clouds: examples, files that are opened, dropped or pasted.
 
 import { EXAMPLES } from "../model/examples.js";
-import { readFile, read } from "../model/files.js";
 import { requestOf } from "../model/operations.js";
 import { DEFAULTS } from "../model/state.js";
+import { repeatsOf, without } from "../reading/cleaning.js";
+import { readCloud } from "../reading/client.js";
+import { element } from "../view/readout.js";
+import { rowsInWords } from "../words/problems.js";
+import { refuse, Undecided } from "../words/refusal.js";
 import { ask, stopAsking } from "./asking.js";
 import { at } from "./elements.js";
-import { page } from "./page.js";
+import { showRequest } from "./leaving/request.js";
+import { change, events, page } from "./page.js";
 import { showAnswer } from "./picture.js";
-import { refuse } from "./registered.js";
-import { showRequest } from "./request.js";
 import { fillForm, keepInLink } from "./settings.js";
 
-/** @import { Cloud } from "../types.d.ts" */
+/** @import { Cloud, ReadCloud, Remedy } from "../types.d.ts" */
 
+/** Shows the example or the file that the settings name. */
 export async function loadExample() {
-  const { example } = page.settings;
-  if (example === "" && page.cloud) return at("file").click();
+  const { example, fileName } = page.settings;
+  if (example === "") return loadNamed(fileName);
   if (!Object.hasOwn(EXAMPLES, example)) {
     page.settings.example = DEFAULTS.example;
     fillForm();
   }
-  await load(EXAMPLES[page.settings.example].make);
+  const name = page.settings.example;
+  const { make, isLarge } = EXAMPLES[name];
+  await load(async () => ({ ...(await (isLarge ? readCloud({ example: name }) : make())), example: name }));
 }
+
+/**
+ * Shows the file that was opened last, if it has a name, or asks for it: links carry no points.
+ *
+ * @param {string} name
+ */
+async function loadNamed(name) {
+  const { own } = page;
+  if (own && (name === "" || own.name === name)) {
+    page.settings.fileName = own.name;
+    return load(() => own);
+  }
+  if (name === "" && page.cloud) {
+    page.settings.example = page.cloud.example ?? "";
+    fillForm();
+    return at("file").click();
+  }
+  return load(() => {
+    const file = name || "a file";
+    const detail = `Links carry settings, no points, so ${name || "the file"} stayed with whoever made this link. Open it here if you have it.`;
+    throw new Undecided(`This link shows ${file}`, detail, [
+      { label: `Open ${file}`, act: "openFile" },
+      { label: "See an example", set: { example: DEFAULTS.example, fileName: "" } },
+    ]);
+  });
+}
+events.addEventListener("openFile", () => at("file").click());
 
 /**
  * Shows a cloud. A later choice ends an earlier one.
@@ -41,7 +74,9 @@ async function load(make) {
     if (page.loading !== loading) return;
     stopAsking();
     Object.assign(page, { cloud, cloudId: undefined });
+    if (cloud.example === undefined) page.own = cloud;
     at("cloud").textContent = descriptionOf(cloud);
+    showCleaning(cloud);
     await showFirst(cloud);
   } catch (error) {
     if (page.loading !== loading) return;
@@ -76,14 +111,105 @@ async function showFirst(cloud) {
   document.body.dataset.state = "settled";
 }
 
-function loadOwn(make) {
-  page.settings.example = "";
+/**
+ * Shows the cloud of a file. A step back leads to what was there before.
+ *
+ * @param {string} name
+ * @param {() => Promise<ReadCloud>} make
+ */
+function loadOwn(name, make) {
+  Object.assign(page.settings, { example: "", fileName: name });
   fillForm();
-  keepInLink(false);
-  load(make);
+  keepInLink(true);
+  load(async () => decided(await make()));
 }
 
-const fromFile = (file) => loadOwn(() => readFile(file));
+/** @param {File} file */
+const fromFile = (file) => loadOwn(file.name, () => readCloud({ file }));
+
+// What is left out of a file.
+
+/**
+ * A cloud whose points or normals cannot all be used, until its reader decides.
+ *
+ * @type {ReadCloud | undefined}
+ */
+let undecided;
+
+/**
+ * The cloud, if all of it can be used.
+ *
+ * @param {ReadCloud} cloud
+ */
+function decided(cloud) {
+  const { gaps = [], undirected = [], textColumns = [], strictly, points, name } = cloud;
+  if (gaps.length === 0 && undirected.length === 0 && strictly === undefined) return cloud;
+  undecided = cloud;
+  const counted = (rows, what) =>
+    rows.length > 0 ? [`${share(rows.length, points.rows)} ${what} (${rowsInWords(rows, "counted from 0")})`] : [];
+  const texts =
+    textColumns.length === 1
+      ? `The column ${textColumns[0]} is text.`
+      : `The columns ${textColumns.join(", ")} are text.`;
+  const details = [
+    ...(textColumns.length > 0 ? [texts] : []),
+    ...counted(gaps, "have no position"),
+    ...counted(undirected, "have a normal without direction"),
+    ...(strictly ? [`The first place is ${strictly}.`] : []),
+  ];
+  /** @type {Remedy[]} */
+  const remedies = [{ label: "Leave them out and go on", act: "dropGaps" }];
+  if (undirected.length > 0) remedies.push({ label: "Go on without normals", act: "dropNormals" });
+  throw new Undecided(`Not all of ${name} is numbers`, details.join(" "), remedies);
+}
+
+function share(n, of) {
+  return `${n.toLocaleString("en")} of ${of.toLocaleString("en")} points`;
+}
+
+/** Shows what is left of a cloud once rows are dropped from it. */
+function loadWithout(cloud, rows) {
+  load(() => without({ ...cloud, repeats: undefined }, rows));
+}
+
+events.addEventListener("dropGaps", () => {
+  if (!undecided) return;
+  const { gaps, undirected, repeats = [], ...cloud } = undecided;
+  const rows = Uint32Array.from(new Set([...(gaps ?? []), ...(undirected ?? [])])).sort();
+  if (rows.length > 0) loadWithout(cloud, rows);
+  else load(() => ({ ...cloud, repeats: Uint32Array.from(repeats) }));
+});
+events.addEventListener("dropNormals", () => {
+  const cloud = undecided?.name === page.settings.fileName ? undecided : page.cloud;
+  if (cloud) loadWithout({ ...cloud, normals: undefined }, Uint32Array.from(undecided?.gaps ?? []));
+});
+events.addEventListener("dropRepeats", () => {
+  const { cloud } = page;
+  if (cloud) loadWithout(cloud, cloud.repeats ?? repeatsOf(cloud.points));
+});
+
+/**
+ * Says which points repeat others, and offers to drop or merge them.
+ *
+ * @param {Cloud} cloud
+ */
+function showCleaning({ repeats = new Uint32Array(), points }) {
+  at("cleaning").hidden = repeats.length === 0;
+  if (repeats.length === 0) return;
+  const button = (label, run) => {
+    const made = element("button", { type: "button", textContent: label });
+    made.addEventListener("click", run);
+    return made;
+  };
+  const text = `${share(repeats.length, points.rows)} repeat earlier ones. ${rowsInWords(repeats, "Counted from 0")}`;
+  at("cleaning").replaceChildren(
+    element("p", { className: "hint", textContent: text }),
+    button("Drop them", () => events.dispatchEvent(new Event("dropRepeats"))),
+    button("Merge them", () => change({ duplicates: "merge" }, { isPush: true })),
+  );
+}
+
+// Files that are chosen, dropped or pasted.
 
 at("file").addEventListener("change", () => {
   const file = at("file").files?.[0];
@@ -107,5 +233,5 @@ window.addEventListener("drop", (event) => {
 window.addEventListener("paste", (event) => {
   if (event.target instanceof Element && event.target.matches("input, select")) return;
   const text = event.clipboardData?.getData("text");
-  if (text) loadOwn(() => read(new TextEncoder().encode(text), "pasted"));
+  if (text) fromFile(new File([text], "pasted"));
 });

@@ -8,7 +8,8 @@ import { shown } from "../view/colours.js";
 import { element } from "../view/readout.js";
 import { at } from "./elements.js";
 import { events, page, scene } from "./page.js";
-import { idOf, refuse } from "./registered.js";
+import { idOf } from "./registered.js";
+import { refuse } from "../words/refusal.js";
 
 /** @import { Answer, Cloud } from "../types.d.ts" */
 

@@ -1,11 +1,8 @@
 // @ts-check
-// The cloud as the service knows it, and refusals.
+// The cloud as the service knows it.
 
-import { remedyOf } from "../model/operations.js";
 import { Refusal, register } from "../model/service.js";
-import { showRefusal } from "../view/readout.js";
-import { at } from "./elements.js";
-import { change, page } from "./page.js";
+import { page } from "./page.js";
 
 /** @import { Cloud } from "../types.d.ts" */
 
@@ -22,20 +19,16 @@ export async function idOf(cloud, signal) {
   return id;
 }
 
+/** Problems of a service that has forgotten what it was told, as one that was restarted. */
+const FORGOTTEN = ["unknown-cloud", "unknown-job"];
+
 /** Tries once more if the service has forgotten the cloud. */
 export async function repeated(send) {
   try {
     return await send();
   } catch (error) {
-    if (!(error instanceof Refusal) || error.slug !== "unknown-cloud") throw error;
+    if (!(error instanceof Refusal) || !FORGOTTEN.includes(error.slug)) throw error;
     page.cloudId = undefined;
     return send();
   }
-}
-
-export function refuse(error) {
-  const isRefusal = error instanceof Refusal;
-  const remedy = isRefusal ? remedyOf(error, page.settings) : undefined;
-  const title = isRefusal ? error.problem.title : "This did not work";
-  showRefusal(at("refusal"), { title, detail: error.message, remedy }, change);
 }

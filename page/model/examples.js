@@ -2,10 +2,15 @@
 // Clouds to begin with. All but the dragon are made here, the same for everyone.
 
 import { Tensor } from "./tensors.js";
+import { inTurns } from "./turns.js";
 
 /** @import { Cloud } from "../types.d.ts" */
 
-/** @type {Record<string, { title: string, make: () => Cloud | Promise<Cloud> }>} */
+/**
+ * Examples by their names. Large ones are made beside the page.
+ *
+ * @type {Record<string, { title: string, make: () => Cloud | Promise<Cloud>, isLarge?: boolean }>}
+ */
 export const EXAMPLES = {
   dragon: { title: "Dragon, 12,000 points of a scan", make: dragon },
   torus: { title: "Torus, 2,000 random points", make: () => torus(2000) },
@@ -22,7 +27,7 @@ export const EXAMPLES = {
   ellipse: { title: "Ellipse, 64 points", make: () => ellipse(64, 0) },
   noisy: { title: "Ellipse with noise, 32 points", make: () => ellipse(32, 0.1) },
   noisier: { title: "Ellipse with more noise, 32 points", make: () => ellipse(32, 0.25) },
-  million: { title: "Torus, a million points", make: () => torus(1_000_000) },
+  million: { title: "Torus, a million points", make: () => torus(1_000_000), isLarge: true },
 };
 
 /** A generator of uniform numbers between 0 and 1 with a fixed seed (mulberry32). */
@@ -45,17 +50,21 @@ function cloud(name, rows) {
   return { name, points: new Tensor(Float64Array.from(rows.flat()), [rows.length, d]), values: new Map() };
 }
 
-function torus(n) {
+async function torus(n) {
   const random = uniform(1);
   const data = new Float64Array(3 * n);
-  for (let row = 0; row < n; ) {
-    const [u, v] = [2 * Math.PI * random(), 2 * Math.PI * random()];
-    const radius = 1 + 0.4 * Math.cos(v);
-    // The outer side has more area.
-    if (random() > radius / 1.4) continue;
-    data.set([radius * Math.cos(u), radius * Math.sin(u), 0.4 * Math.sin(v)], 3 * row);
-    row++;
-  }
+  await inTurns(n, (from, to) => {
+    for (let row = from; row < to; ) {
+      const [u, v] = [2 * Math.PI * random(), 2 * Math.PI * random()];
+      const radius = 1 + 0.4 * Math.cos(v);
+      // The outer side has more area.
+      if (random() > radius / 1.4) continue;
+      data[3 * row] = radius * Math.cos(u);
+      data[3 * row + 1] = radius * Math.sin(u);
+      data[3 * row + 2] = 0.4 * Math.sin(v);
+      row++;
+    }
+  });
   return { name: "torus", points: new Tensor(data, [n, 3]), values: new Map() };
 }
 

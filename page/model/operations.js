@@ -1,8 +1,7 @@
 // @ts-check
 // What can be asked about a cloud, and the quantities of the answers.
 
-/** @import { Answer, Cloud, Quantity, Remedy, Settings } from "../types.d.ts" */
-/** @import { Refusal } from "./service.js" */
+/** @import { Answer, Cloud, Quantity, Settings } from "../types.d.ts" */
 
 /** @type {Record<string, { title: string, path: string, method: string }>} */
 export const OPERATIONS = {
@@ -118,7 +117,9 @@ function channelsOf(values) {
 function columnOf(tensor, at) {
   if (!tensor) return undefined;
   if (tensor.width === 1) return tensor.data;
-  return Float64Array.from({ length: tensor.rows }, (_, row) => tensor.data[row * tensor.width + at]);
+  const column = new Float64Array(tensor.rows);
+  for (let row = 0; row < tensor.rows; row++) column[row] = tensor.data[row * tensor.width + at];
+  return column;
 }
 
 function unitOf(name, d) {
@@ -127,30 +128,4 @@ function unitOf(name, d) {
   if (name === "normal_std") return "rad";
   if (/^(residuals|position_std)$/.test(name)) return "L";
   return "";
-}
-
-/**
- * What can be done about a refusal.
- *
- * @param {Refusal} refusal
- * @param {Settings} settings
- * @returns {Remedy | undefined}
- */
-export function remedyOf({ slug, problem }, settings) {
-  const pointer = problem.errors?.[0]?.pointer ?? "";
-  if (problem.minimum_alpha !== undefined && problem.minimum_alpha > 0) {
-    const alpha = Number(problem.minimum_alpha.toPrecision(2));
-    return { label: `Use α = ${alpha}`, set: { alpha } };
-  }
-  if (slug === "duplicate-points") return { label: "Merge equal points", set: { duplicates: "merge" } };
-  if (pointer === "/open") return { label: "Let the surface end with its points", set: { open: true } };
-  if (pointer === "/step" && settings.step > 0) return { label: "Choose the step automatically", set: { step: 0 } };
-  if (slug === "kernel-not-smooth") return { label: "Choose the kernel automatically", set: { family: "auto" } };
-  if (["unsupported-by-solver", "problem-too-large"].includes(slug)) {
-    return { label: "Let the service choose", set: { solver: "auto", surfaceModel: "auto", family: "auto", alpha: 0 } };
-  }
-  if (slug === "invalid-request" && pointer.startsWith("/kernel")) {
-    return { label: "Choose the kernel automatically", set: { family: "auto", lengthScale: 0, epsilon: 0 } };
-  }
-  return undefined;
 }

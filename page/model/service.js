@@ -23,6 +23,21 @@ export class Refusal extends Error {
   }
 }
 
+/** The service does not answer: it was stopped, or the network is interrupted. */
+export class Lost extends Error {}
+
+/** Statuses by which a proxy says, without a problem document, that there is no service behind it. */
+const ABSENT = [502, 503, 504];
+
+/** Whether the service answers. */
+export async function isReachable() {
+  try {
+    return (await fetch("health/live", { cache: "no-store" })).ok;
+  } catch {
+    return false;
+  }
+}
+
 let ownKey = "";
 
 /** The key of this tab. Browsers that allow no storage forget it when the page is left. */
@@ -48,11 +63,34 @@ export function saveKey(key) {
 async function ask(path, options) {
   const key = savedKey();
   const headers = { ...options.headers, ...(key ? { Authorization: `Bearer ${key}` } : {}) };
-  const response = await fetch(path, { ...options, headers });
+  const response = await sent(path, { ...options, headers });
   if (response.ok) return response;
   const isProblem = response.headers.get("Content-Type")?.startsWith("application/problem+json");
+  if (!isProblem && ABSENT.includes(response.status)) throw new Lost();
   const problem = isProblem ? await response.json() : { title: "No answer", detail: `HTTP status ${response.status}` };
   throw new Refusal({ status: response.status, ...problem });
+}
+
+/** A body in safetensors. Browsers send a blob beside the page, and an array within it. */
+function blobOf(tensors, request) {
+  return new Blob([encode(tensors, request)]);
+}
+
+async function sent(path, options) {
+  try {
+    return await fetch(path, options);
+  } catch (error) {
+    throw options.signal?.aborted ? error : new Lost();
+  }
+}
+
+/** A part of an answer, whose connection may break off. */
+async function arriving(part, signal) {
+  try {
+    return await part;
+  } catch (error) {
+    throw signal?.aborted ? error : new Lost();
+  }
 }
 
 /**
@@ -67,7 +105,7 @@ export async function register(points, normals, signal) {
   /** @type {Record<string, Tensor>} */
   const tensors = normals ? { points, normals } : { points };
   const headers = { "Content-Type": TENSORS, Accept: "application/json" };
-  const response = await ask("v1/clouds", { method: "POST", body: encode(tensors, {}), headers, signal });
+  const response = await ask("v1/clouds", { method: "POST", body: blobOf(tensors, {}), headers, signal });
   return (await response.json()).cloud_id;
 }
 
@@ -86,7 +124,7 @@ export async function register(points, normals, signal) {
  * @returns {Promise<Answer>}
  */
 export async function compute(path, request, { nPoints, signal, follow, tensors }) {
-  const body = tensors ? encode(tensors, request) : JSON.stringify(request);
+  const body = tensors ? blobOf(tensors, request) : JSON.stringify(request);
   const headers = { "Content-Type": tensors ? TENSORS : "application/json", Accept: TENSORS };
   const began = performance.now();
   const found = await answered(path, { method: "POST", body, headers, signal }, { nPoints, follow });
@@ -118,11 +156,11 @@ export async function download(path, request, { mediaType, nPoints }) {
  * @param {{ nPoints: number, follow?: (progress?: Progress) => void }} effort
  */
 async function answered(path, options, { nPoints, follow }) {
-  return nPoints < JOB_FROM ? whole(await ask(path, options)) : asJob(path, options, follow);
+  return nPoints < JOB_FROM ? whole(await ask(path, options), options.signal) : asJob(path, options, follow);
 }
 
-async function whole(response) {
-  return { buffer: await response.arrayBuffer(), headers: response.headers };
+async function whole(response, signal) {
+  return { buffer: await arriving(response.arrayBuffer(), signal), headers: response.headers };
 }
 
 async function asJob(path, options, follow) {
@@ -130,12 +168,12 @@ async function asJob(path, options, follow) {
   // The request is not broken off: a job whose id nobody has would run to its end.
   const headers = { ...options.headers, Prefer: "respond-async" };
   const response = await ask(path, { ...options, signal: undefined, headers });
-  if (response.status !== 202) return whole(response);
+  if (response.status !== 202) return whole(response, signal);
   const job = `v1/jobs/${response.headers.get("Location")?.split("/").pop()}`;
   try {
     signal?.throwIfAborted();
     while (!(await followed(`${job}/events`, signal, follow))) await new Promise((resume) => setTimeout(resume, 1000));
-    return await whole(await ask(`${job}/result`, { signal }));
+    return await whole(await ask(`${job}/result`, { signal }), signal);
   } finally {
     // Cancels the job, or deletes the result that was fetched.
     ask(job, { method: "DELETE" }).catch(() => {});
@@ -149,7 +187,7 @@ async function followed(path, signal, follow) {
   const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
   let text = "";
   for (;;) {
-    const { value, done } = await reader.read();
+    const { value, done } = await arriving(reader.read(), signal);
     if (done) return false;
     text += value;
     const events = text.split("\n\n");

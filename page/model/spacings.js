@@ -7,11 +7,12 @@ import { inTurns, turn } from "./turns.js";
 const NEIGHBOURS = 6;
 
 /** Points before and after a point on the curve that are looked at. */
-const WINDOW = 10;
+const WINDOW = 8;
 
 /** Bits of a coordinate on the curve, and shifts of the two curves in parts of the extent. */
 const BITS = 10;
 const SHIFTS = [0, 0.29];
+const MASK = 2 ** BITS - 1;
 
 /** Spacings are held within these factors of their median, so that a stray point is no large dot. */
 const LEAST = 0.05;
@@ -60,14 +61,13 @@ function boundsOf(places) {
 async function curveOf(places, box, shift) {
   const n = places.length / 3;
   const longest = Math.max(...box.map(([low, high]) => high - low)) || 1;
-  const cells = 2 ** BITS - 1;
   const keys = new Uint32Array(n);
   await inTurns(n, (from, to) => {
     for (let at = from; at < to; at++) {
       let key = 0;
       for (let axis = 0; axis < 3; axis++) {
         const share = ((places[3 * at + axis] - box[axis][0]) / longest + shift) / (1 + shift);
-        key |= spread(Math.min(Math.max(Math.floor(share * cells), 0), cells)) << axis;
+        key |= spread(Math.min(Math.max(Math.floor(share * MASK), 0), MASK)) << axis;
       }
       keys[at] = key;
     }
@@ -91,10 +91,10 @@ async function sorted(keys) {
   for (let bit = 0; bit < 3 * BITS; bit += BITS) {
     await turn();
     const begins = new Uint32Array(2 ** BITS + 1);
-    const digit = (at) => (keys[at] >>> bit) & (2 ** BITS - 1);
-    for (let at = 0; at < n; at++) begins[digit(at) + 1]++;
-    for (let value = 0; value < 2 ** BITS; value++) begins[value + 1] += begins[value];
-    for (const at of order) other[begins[digit(at)]++] = at;
+    for (let at = 0; at < n; at++) begins[((keys[at] >>> bit) & MASK) + 1]++;
+    for (let value = 0; value <= MASK; value++) begins[value + 1] += begins[value];
+    await turn();
+    for (let place = 0; place < n; place++) other[begins[(keys[order[place]] >>> bit) & MASK]++] = order[place];
     [order, other] = [other, order];
   }
   return order;
@@ -105,20 +105,32 @@ async function alongCurve(places, order, squares) {
   const n = order.length;
   const k = Math.min(NEIGHBOURS, n - 1);
   const nearest = new Float64Array(k);
+  // In the order of the curve, so that neighbours lie side by side in memory.
+  const along = new Float32Array(3 * n);
   await inTurns(n, (from, to) => {
     for (let place = from; place < to; place++) {
-      const point = order[place];
-      const [x, y, z] = [places[3 * point], places[3 * point + 1], places[3 * point + 2]];
+      for (let axis = 0; axis < 3; axis++) along[3 * place + axis] = places[3 * order[place] + axis];
+    }
+  });
+  await inTurns(n, (from, to) => {
+    for (let place = from; place < to; place++) {
+      const x = along[3 * place];
+      const y = along[3 * place + 1];
+      const z = along[3 * place + 2];
       nearest.fill(Infinity);
-      for (let next = Math.max(0, place - WINDOW); next <= Math.min(n - 1, place + WINDOW); next++) {
+      const last = Math.min(n - 1, place + WINDOW);
+      for (let next = Math.max(0, place - WINDOW); next <= last; next++) {
         if (next === place) continue;
-        const at = 3 * order[next];
-        const square = (places[at] - x) ** 2 + (places[at + 1] - y) ** 2 + (places[at + 2] - z) ** 2;
+        const a = along[3 * next] - x;
+        const b = along[3 * next + 1] - y;
+        const c = along[3 * next + 2] - z;
+        const square = a * a + b * b + c * c;
         for (let slot = k - 1; slot >= 0 && square < nearest[slot]; slot--) {
           if (slot + 1 < k) nearest[slot + 1] = nearest[slot];
           nearest[slot] = square;
         }
       }
+      const point = order[place];
       if (nearest[k - 1] < squares[point]) squares[point] = nearest[k - 1];
     }
   });

@@ -5,6 +5,7 @@
 
 export const DEFAULTS = {
   example: "dragon",
+  fileName: "",
   operation: "curvatures",
   quantity: "",
   std: true,
@@ -49,6 +50,9 @@ export const DEFAULTS = {
   sectionAt: 0.5,
   orthographic: false,
 };
+
+/** Characters of the name of a file that a link may have. */
+const MAX_NAME = 100;
 
 /** Words of settings that are no choice of the form. */
 const WORDS = { colour: ["quantity", "support"] };
@@ -102,6 +106,7 @@ export function fromHash(hash, words) {
     if (kind === "boolean") settings[name] = text === "true";
     else if (kind === "number") settings[name] = Number.isFinite(Number(text)) ? Number(text) : DEFAULTS[name];
     else if (name === "unit") settings.unit = text.slice(0, 8);
+    else if (name === "fileName") settings[name] = text.slice(0, MAX_NAME);
     else if (name === "quantity" || words[name]?.includes(text)) settings[name] = text;
   }
   return settings;

@@ -40,18 +40,36 @@ export function numberOf(text) {
  * @returns {Map<string, Float64Array>}
  */
 export function table(text) {
+  return parsed(text).columns;
+}
+
+/**
+ * The columns of a table that has text among its numbers: such a cell is a missing number. Columns of values
+ * that have hardly any numbers are left out, and their names returned.
+ *
+ * @param {string} text
+ */
+export function lenientTable(text) {
+  const { columns, nRows } = parsed(text, true);
+  const isText = ([name, numbers]) => !isGeometric(name) && 2 * numbers.filter(Number.isFinite).length <= nRows;
+  const textColumns = [...columns].filter(isText).map(([name]) => name);
+  for (const name of textColumns) columns.delete(name);
+  return { columns, textColumns };
+}
+
+function parsed(text, isLenient = false) {
   const lines = contentOf(text);
   const count = takeCount(lines);
   if (lines.length === 0) throw new Error("the file has no rows");
   const head = new Head(lines[0]);
   const names = head.names();
   const rows = head.hasNames ? lines.slice(1) : lines;
-  const [columns, numbers] = columnsOf(rows, head, names);
+  const [columns, numbers] = columnsOf(rows, head, { names, isLenient });
   if (rows.length === 0) throw new Error("the file has no rows");
   numbers.check(head);
   if (count) checkCount(count, rows.length);
   if (!head.hasNames && head.width === 6 && areNormals(columns.slice(3))) names.splice(3, 3, ...NORMALS[0]);
-  return new Map(columns.map((column, at) => [names[at], column]));
+  return { columns: new Map(columns.map((column, at) => [names[at], column])), nRows: rows.length };
 }
 
 /** Lines that are neither blank nor comments, with their numbers in the file. */
@@ -81,10 +99,10 @@ function checkCount({ number, announced }, nRows) {
 }
 
 /** Numbers by columns, and what was seen of their decimal marks. */
-function columnsOf(rows, head, names) {
+function columnsOf(rows, head, { names, isLenient }) {
   const columns = names.map(() => new Float64Array(rows.length));
   const mayMiss = names.map((name) => !isGeometric(name));
-  const numbers = new Numbers();
+  const numbers = new Numbers(isLenient);
   rows.forEach((row, at) => {
     const cells = cellsOf(row.text, head.separator);
     if (cells.length !== head.width) throw new Error(head.widthRefusal(row, cells.length));
@@ -174,7 +192,9 @@ function isName(cell) {
 
 /** Reads numbers, which have either decimal points or decimal commas throughout a file. */
 class Numbers {
-  constructor() {
+  /** @param {boolean} isLenient Whether text is a missing number. */
+  constructor(isLenient) {
+    this.isLenient = isLenient;
     this.hasPoint = false;
     /** The first number with a comma. */
     this.withComma = undefined;
@@ -184,15 +204,20 @@ class Numbers {
 
   read(cell, { row, column, mayMiss }) {
     const at = `line ${row.number}:`;
-    if (cell === "") throw new Error(`${at} cell ${column + 1} is empty`);
+    if (cell === "") return this.missing(`${at} cell ${column + 1} is empty`);
     const hasComma = WITH_COMMA.test(cell);
     const value = numberOf(hasComma ? cell.replace(",", ".") : cell);
     if (value === undefined || (Number.isNaN(value) && !mayMiss))
-      throw new Error(`${at} ${quoted(cell)} is no number${remedyOf(cell)}`);
+      return this.missing(`${at} ${quoted(cell)} is no number${remedyOf(cell)}`);
     if (!Number.isFinite(value) && !Number.isNaN(value)) throw new Error(`${at} ${quoted(cell)} is too large`);
     if (hasComma) this.sawComma(cell, at);
     else if (cell.includes(".")) this.sawPoint(cell, at);
     return value;
+  }
+
+  missing(refusal) {
+    if (this.isLenient) return NaN;
+    throw new Error(refusal);
   }
 
   sawComma(cell, at) {

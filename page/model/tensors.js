@@ -72,8 +72,15 @@ export function decode(buffer) {
     const [start, end] = place;
     const bytes = buffer.slice(8 + length + start, 8 + length + end);
     // Whole numbers here are indices, far below 2³².
-    const data = dtype === "I64" ? new Uint32Array(bytes).filter((_, at) => at % 2 === 0) : new Float64Array(bytes);
+    const data = dtype === "I64" ? lowHalves(new Uint32Array(bytes)) : new Float64Array(bytes);
     tensors[name] = new Tensor(data, shape);
   }
   return { tensors, fields: JSON.parse(metadata.response) };
+}
+
+/** Every other number, from the first. */
+function lowHalves(halves) {
+  const low = new Uint32Array(halves.length / 2);
+  for (let at = 0; at < low.length; at++) low[at] = halves[2 * at];
+  return low;
 }

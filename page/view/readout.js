@@ -2,22 +2,11 @@
 // What the picture says in words and numbers: summary, marks by reason, the point under the pointer,
 // diagnostics.
 
+import { REASONS, warningInWords } from "../words/warnings.js";
 import { SUPPORT, cssOf, shown } from "./colours.js";
 
 /** @import { Answer, Cloud, ColourRange, Marks, PageState } from "../types.d.ts" */
-/** @import { Quantity, Remedy, Settings } from "../types.d.ts" */
-
-/** @type {Record<string, string>} */
-const REASONS = {
-  vanishing_gradient: "the function has no gradient",
-  unaffordable_rescue: "too many points without a gradient",
-  kernel_too_rough: "the kernel is too rough",
-  far_from_cloud: "far from the cloud",
-  under_resolved: "too few points for so much curvature",
-  ambiguous_side: "inside and outside are not clear",
-  edge: "two sheets meet at an edge",
-  uncertain: "less certain than it seems",
-};
+/** @import { Quantity } from "../types.d.ts" */
 
 /** Colours of marks, none of which the scales have. */
 const MARKS = [
@@ -110,7 +99,7 @@ export function summaryOf({ answer, cloud, quantity, range, reasons }) {
   for (const part of (answer.fields.parts ?? []).slice(0, 3)) {
     parts.push(`a part with Euler characteristic ${part.euler_characteristic} and ${part.n_boundary_edges} open edges`);
   }
-  for (const warning of answer.fields.diagnostics?.warnings ?? []) parts.push(warning.detail);
+  for (const warning of answer.fields.diagnostics?.warnings ?? []) parts.push(warningInWords(warning));
   return `${parts.join("; ")}.`;
 }
 
@@ -224,24 +213,32 @@ export function showDiagnostics(into, answer) {
 }
 
 /**
- * A refusal with its remedy as a button, which calls `apply`.
+ * A refusal, with what can be done about it as buttons, and what the service said.
  *
  * @param {HTMLElement} into
- * @param {{ title: string, detail: string, remedy?: Remedy }} refusal
- * @param {(settings: Partial<Settings>) => void} [apply]
+ * @param {{
+ *   title: string,
+ *   detail: string,
+ *   said?: string,
+ *   actions?: { label: string, run: () => void }[],
+ * }} refusal
  */
-export function showRefusal(into, { title, detail, remedy }, apply) {
-  const buttons = element("div", { className: "buttons" });
-  if (remedy) {
-    const button = element("button", { type: "button", textContent: remedy.label });
+export function showRefusal(into, { title, detail, said, actions = [] }) {
+  const buttons = actions.map(({ label, run }) => {
+    const button = element("button", { type: "button", textContent: label });
     button.addEventListener("click", () => {
       into.hidden = true;
-      apply?.(remedy.set);
+      run();
     });
-    buttons.append(button);
-  }
-  buttons.append(closing(into));
-  into.replaceChildren(element("h2", { textContent: title }), element("p", { textContent: detail }), buttons);
+    return button;
+  });
+  const summary = element("summary", { textContent: "The words of the service" });
+  into.replaceChildren(
+    element("h2", { textContent: title }),
+    element("p", { textContent: detail }),
+    ...(said ? [element("details", {}, summary, element("p", { textContent: said }))] : []),
+    element("div", { className: "buttons" }, ...buttons, closing(into)),
+  );
   into.hidden = false;
 }
 

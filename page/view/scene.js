@@ -231,7 +231,10 @@ export class Scene {
     const direction = isFlat ? new Vector3(0, 0, 1) : axis ? new Vector3(...axis) : home;
     this.controls.enableRotate = !isFlat;
     this.controls.target.set(0, 0, 0);
-    this.camera.position.copy(direction.normalize().multiplyScalar(2.7 * this.radius));
+    // A narrow window sees less to the sides.
+    const { clientWidth: width, clientHeight: height } = this.frame;
+    const distance = (2.7 * this.radius) / Math.min(1, width / height || 1);
+    this.camera.position.copy(direction.normalize().multiplyScalar(distance));
     this.orthographic.zoom = 1;
     this.resize();
     this.controls.update();

@@ -11,7 +11,7 @@ public static class Circle
     {
         // begin README
         var geometry = new GeometryApi(Environment.GetEnvironmentVariable("GRAMIAN_URL"));
-        var request = new CurvaturesRequest(new CloudRef(points: Points(8)));
+        var request = new CurvaturesRequest(new CloudInput(points: Points(8)));
         var answer = geometry.ComputeCurvatures(request);
         Console.WriteLine(string.Join(" ", answer.MeanCurvatures));
         // end README

@@ -18,7 +18,7 @@ public static class Scenario
     private static readonly string Url = Environment.GetEnvironmentVariable("GRAMIAN_URL");
     private static readonly CloudsApi Clouds = new CloudsApi(Url);
     private static readonly GeometryApi Geometry = new GeometryApi(Url);
-    private static readonly CloudRef Registered = new CloudRef(id: CloudId);
+    private static readonly CloudInput Registered = new CloudInput(id: CloudId);
 
     /// <summary>Eight points of the unit circle.</summary>
     private static readonly List<List<double>> Points = new[,]

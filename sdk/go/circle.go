@@ -16,7 +16,7 @@ func main() {
 	configuration := gramian.NewConfiguration()
 	configuration.Servers = gramian.ServerConfigurations{{URL: os.Getenv("GRAMIAN_URL")}}
 	api := gramian.NewAPIClient(configuration).GeometryAPI
-	request := gramian.NewCurvaturesRequest(gramian.CloudRef{Points: circle(8)})
+	request := gramian.NewCurvaturesRequest(gramian.CloudInput{Points: circle(8)})
 	answer, _, err := api.ComputeCurvatures(context.Background()).CurvaturesRequest(*request).Execute()
 	if err != nil {
 		log.Fatal(err)

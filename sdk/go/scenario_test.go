@@ -157,7 +157,7 @@ func problemOf(t *testing.T, err error) gramian.Problem {
 	return problem
 }
 
-func cloud() gramian.CloudRef {
+func cloud() gramian.CloudInput {
 	reference := gramian.NewCloudRef()
 	reference.SetId(cloudID)
 	return *reference

@@ -1,7 +1,7 @@
 import gramian.client.ApiClient;
 import gramian.client.ApiException;
 import gramian.client.api.GeometryApi;
-import gramian.client.model.CloudRef;
+import gramian.client.model.CloudInput;
 import gramian.client.model.CurvaturesRequest;
 import java.util.List;
 import java.util.stream.IntStream;
@@ -11,7 +11,7 @@ public class Circle {
     public static void main(String[] arguments) throws ApiException {
         // begin README
         ApiClient client = new ApiClient().setBasePath(System.getenv("GRAMIAN_URL"));
-        CloudRef circle = new CloudRef().points(circle(8));
+        CloudInput circle = new CloudInput().points(circle(8));
         CurvaturesRequest request = new CurvaturesRequest().cloud(circle).queries(circle(8));
         System.out.println(new GeometryApi(client).computeCurvatures(request).getMeanCurvatures());
         // end README

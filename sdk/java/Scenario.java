@@ -5,7 +5,7 @@ import gramian.client.api.CloudsApi;
 import gramian.client.api.GeometryApi;
 import gramian.client.api.OperatorsApi;
 import gramian.client.api.ValuesApi;
-import gramian.client.model.CloudRef;
+import gramian.client.model.CloudInput;
 import gramian.client.model.CloudRequest;
 import gramian.client.model.CurvaturesRequest;
 import gramian.client.model.Kernel;
@@ -52,7 +52,7 @@ public class Scenario {
     private void normalsPointOutward() throws ApiException {
         // Without an id, as the first request of a newcomer: normals and variances of the noise are sent
         // empty.
-        CloudRef inline = new CloudRef().points(POINTS);
+        CloudInput inline = new CloudInput().points(POINTS);
         NormalsRequest request = new NormalsRequest().cloud(inline).queries(POINTS).kernel(gauss(2.0)).alpha(0.0);
         List<List<Double>> normals = geometry.computeNormals(request).getNormals();
         check(normals.size() == POINTS.size(), normals);
@@ -121,8 +121,8 @@ public class Scenario {
     }
 
     /** A cloud is referred to by its id or given by its points. */
-    private static CloudRef cloud() {
-        return new CloudRef().id(CLOUD_ID).points(null);
+    private static CloudInput cloud() {
+        return new CloudInput().id(CLOUD_ID).points(null);
     }
 
     /** exp(−r²/ℓ²) */

@@ -5,7 +5,7 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 
-import { KEY_VARIABLE, LANGUAGES } from "../../page/model/snippets.js";
+import { KEY_VARIABLE, LANGUAGES } from "../../page/model/leaving/snippets.js";
 import { open, opened, settled, sphere, textOf } from "./browser.mjs";
 import { ran, started } from "./running.mjs";
 

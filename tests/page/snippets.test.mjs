@@ -6,7 +6,7 @@ import { readFileSync } from "node:fs";
 import { test } from "node:test";
 
 import { OPERATIONS, requestOf } from "../../page/model/operations.js";
-import { LANGUAGES, snippet, sourceOf } from "../../page/model/snippets.js";
+import { LANGUAGES, snippet, sourceOf } from "../../page/model/leaving/snippets.js";
 import { DEFAULTS, fromHash } from "../../page/model/state.js";
 import { Tensor } from "../../page/model/tensors.js";
 import { asked, HOSTILE, ID } from "./running.mjs";
@@ -78,7 +78,9 @@ test("the words of the page are those of the document", () => {
 test("links choose among the words of the page, and nothing else", () => {
   const texts = Object.keys(DEFAULTS).filter((name) => typeof DEFAULTS[name] === "string");
   for (const text of [...HOSTILE, "", "none of them", "__proto__"]) {
-    const given = Object.fromEntries(texts.filter((name) => name !== "quantity").map((name) => [name, text]));
+    const given = Object.fromEntries(
+      texts.filter((name) => !["quantity", "fileName", "unit"].includes(name)).map((name) => [name, text]),
+    );
     assert.deepEqual(fromHash(`#${new URLSearchParams(given)}`, words), DEFAULTS, text);
   }
   for (const [name, text] of [

@@ -14,7 +14,7 @@ use crate::problem::Problem;
 use crate::problem::catalogue;
 use crate::state::host::Host;
 use crate::wire::compression::SMALLER_BODY;
-use crate::wire::negotiation::{BodyFormat, announced};
+use crate::wire::negotiation::{Announcement, BodyFormat};
 use crate::wire::read::body::{RequestBody, UnpackedBody};
 use gramian_observer::Observer;
 
@@ -76,7 +76,7 @@ impl ReceivedBody {
 /// Reads a body of at most `host.guest.shares.body` bytes, in one of the formats.
 ///
 /// # Errors
-/// - 415 unless the headers announce one of the formats.
+/// - 415 unless the headers announce one of the formats, or no type for what begins as a JSON object.
 /// - 413 beyond the limit.
 /// - 400 if the connection breaks off.
 /// - 408 if the body comes too slowly.
@@ -90,8 +90,10 @@ pub async fn read_body(
     body: Body,
     formats: &[BodyFormat],
 ) -> Result<ReceivedBody, Problem> {
-    let (format, coding) = announced(headers, formats)?;
-    let (bytes, mut memory) = read_bytes(host, owner, headers, body).await?;
+    let Announcement { format, coding, unless_object } = Announcement::of(headers, formats)?;
+    let mut reader = Reader::begin(host, owner, headers)?;
+    reader.unless_object = unless_object;
+    let (bytes, mut memory) = reader.read(body).await?;
     let body = RequestBody::new(format, coding, bytes, host.guest.shares.body);
     // All memory for parsing is reserved before it begins, as far as it can be foreseen.
     let n_to_parse = body.parsing().n_bytes(body.n_bytes_expected(), &host.guest.lists);
@@ -111,30 +113,7 @@ pub async fn read_bytes(
     headers: &HeaderMap,
     body: Body,
 ) -> Result<(Vec<u8>, Reservation), Problem> {
-    let limit = host.guest.shares.body;
-    let length = announced_length(headers);
-    // The refusal is immediate. The connection still reads on for a client that only listens after sending.
-    if let Some(required) = length.filter(|&length| length > limit) {
-        return Err(too_large(limit, Some(required)));
-    }
-    host.compute.check_room(owner)?;
-    let mut reader = Reader {
-        host,
-        began: Instant::now(),
-        memory: host.intake.try_reserve(owner, 0).ok_or_else(Problem::internal)?,
-        bytes: Vec::new(),
-        most: length.unwrap_or(limit),
-    };
-    let mut body = body;
-    while let Some(data) = reader.next(&mut body).await? {
-        if reader.bytes.len() + data.len() > limit {
-            return Err(too_large(limit, None));
-        }
-        reader.make_room(data.len()).await?;
-        reader.bytes.extend_from_slice(&data);
-    }
-    let Reader { memory, bytes, .. } = reader;
-    Ok((bytes, memory))
+    Reader::begin(host, owner, headers)?.read(body).await
 }
 
 fn announced_length(headers: &HeaderMap) -> Option<usize> {
@@ -152,9 +131,52 @@ struct Reader<'a> {
     bytes: Vec<u8>,
     /// Largest number of bytes that the body may have.
     most: usize,
+    /// Refusal of a body that does not begin with `{`. `None` once its first character has come.
+    unless_object: Option<Problem>,
 }
 
-impl Reader<'_> {
+impl<'a> Reader<'a> {
+    /// Refuses what is too long by its headers, or finds no place.
+    fn begin(host: &'a Host, owner: Owner, headers: &HeaderMap) -> Result<Self, Problem> {
+        let limit = host.guest.shares.body;
+        let length = announced_length(headers);
+        // The refusal is immediate. The connection still reads on for a client that only listens after
+        // sending.
+        if let Some(required) = length.filter(|&length| length > limit) {
+            return Err(too_large(limit, Some(required)));
+        }
+        host.compute.check_room(owner)?;
+        let memory = host.intake.try_reserve(owner, 0).ok_or_else(Problem::internal)?;
+        let most = length.unwrap_or(limit);
+        Ok(Self { host, began: Instant::now(), memory, bytes: Vec::new(), most, unless_object: None })
+    }
+
+    /// Reads to the end.
+    async fn read(mut self, mut body: Body) -> Result<(Vec<u8>, Reservation), Problem> {
+        let limit = self.host.guest.shares.body;
+        while let Some(data) = self.next(&mut body).await? {
+            if self.bytes.len() + data.len() > limit {
+                return Err(too_large(limit, None));
+            }
+            self.check_opening(&data)?;
+            self.make_room(data.len()).await?;
+            self.bytes.extend_from_slice(&data);
+        }
+        match self.unless_object {
+            None => Ok((self.bytes, self.memory)),
+            Some(refusal) => Err(refusal),
+        }
+    }
+
+    /// Refuses a body without a type at its first character, unless it begins as a JSON object.
+    fn check_opening(&mut self, data: &[u8]) -> Result<(), Problem> {
+        let Some(first) = data.iter().find(|byte| !b" \t\r\n".contains(byte)) else { return Ok(()) };
+        match self.unless_object.take() {
+            Some(refusal) if *first != b'{' => Err(refusal),
+            _ => Ok(()),
+        }
+    }
+
     /// Returns the next piece of the body, if it comes in time.
     async fn next(&self, body: &mut Body) -> Result<Option<bytes::Bytes>, Problem> {
         let in_time = Duration::from_secs_f64(self.bytes.len() as f64 / LEAST_BYTES_PER_SECOND);

@@ -156,31 +156,56 @@ fn accepted_coding(headers: &HeaderMap, format: Format) -> Coding {
     best.map_or(Coding::Identity, |(coding, _)| coding)
 }
 
-/// Reads the format and coding of a body from `Content-Type` and `Content-Encoding`.
-///
-/// # Errors
-/// 415 `unsupported-media-type` for a media type not in `formats`, or a coding other than gzip and zstd.
-pub fn announced(headers: &HeaderMap, formats: &[BodyFormat]) -> Result<(BodyFormat, Coding), Problem> {
-    let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
-    let essence = text(header::CONTENT_TYPE).and_then(|value| value.split(';').next()).unwrap_or("").trim();
-    let format = formats.iter().find(|format| essence.eq_ignore_ascii_case(format.media_type()));
-    let format = *format.ok_or_else(|| {
+/// Format and coding of a body, by its headers.
+#[derive(Debug)]
+pub struct Announcement {
+    pub format: BodyFormat,
+    pub coding: Coding,
+    /// 415 for a body without a type, which is JSON if it begins with `{` and refused otherwise.
+    pub unless_object: Option<Problem>,
+}
+
+impl Announcement {
+    /// Reads `Content-Type` and `Content-Encoding`.
+    ///
+    /// Programs may leave out the type of JSON. Pages in a browser may not: without a type, a page of any
+    /// origin could send a body that this server computes, because browsers only ask for permission first
+    /// (by a CORS preflight) if there is a type such as that of JSON.
+    ///
+    /// # Errors
+    /// 415 `unsupported-media-type` for a media type not in `formats`, or a coding other than gzip and zstd.
+    pub fn of(headers: &HeaderMap, formats: &[BodyFormat]) -> Result<Self, Problem> {
+        let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
+        let essence =
+            text(header::CONTENT_TYPE).and_then(|value| value.split(';').next()).unwrap_or("").trim();
+        let coding = announced_coding(text(header::CONTENT_ENCODING).unwrap_or("identity").trim())?;
+        if let Some(&format) = formats.iter().find(|it| essence.eq_ignore_ascii_case(it.media_type())) {
+            return Ok(Self { format, coding, unless_object: None });
+        }
         let found = if essence.is_empty() { "no Content-Type" } else { essence };
         let detail = format!(
             "expected Content-Type: {}, found {found:?}",
             names(formats.iter().map(|format| format.media_type()))
         );
-        Problem::new(catalogue::UNSUPPORTED_MEDIA_TYPE, detail)
-    })?;
-    let coding = text(header::CONTENT_ENCODING).unwrap_or("identity").trim();
-    let known = [Coding::Identity, Coding::Gzip, Coding::Zstd];
-    match known.into_iter().find(|known| coding.eq_ignore_ascii_case(known.name())) {
-        Some(coding) => Ok((format, coding)),
-        None => {
-            let detail = format!("Content-Encoding {coding:?} is not supported; send gzip, zstd or neither");
-            Err(Problem::new(catalogue::UNSUPPORTED_MEDIA_TYPE, detail))
+        let refusal = Problem::new(catalogue::UNSUPPORTED_MEDIA_TYPE, detail);
+        let may_be_object = essence.is_empty()
+            && coding == Coding::Identity
+            && formats.contains(&BodyFormat::Json)
+            && !headers.contains_key(header::ORIGIN);
+        if may_be_object {
+            Ok(Self { format: BodyFormat::Json, coding, unless_object: Some(refusal) })
+        } else {
+            Err(refusal)
         }
     }
+}
+
+fn announced_coding(name: &str) -> Result<Coding, Problem> {
+    let known = [Coding::Identity, Coding::Gzip, Coding::Zstd];
+    known.into_iter().find(|known| name.eq_ignore_ascii_case(known.name())).ok_or_else(|| {
+        let detail = format!("Content-Encoding {name:?} is not supported; send gzip, zstd or neither");
+        Problem::new(catalogue::UNSUPPORTED_MEDIA_TYPE, detail)
+    })
 }
 
 /// Joins all lines of a list header. `None` if the header is absent.

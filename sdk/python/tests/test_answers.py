@@ -18,8 +18,8 @@ from sent import CIRCLE, METHODS, OPERATORS, QUERYING, VALUES
 import gramian
 from gramian import Kernel, Surface
 from gramian.answers import Answer
-from gramian.answers.files import replace_file
 from gramian.answers.fit import operator_fit_used, surface_fit_used
+from gramian.export import replace_file
 from gramian.rest.types import UNSET, Unset
 from gramian.wire.tensors import Members
 
@@ -65,7 +65,7 @@ def sparse(value: Any) -> list[Any]:
 
 def assert_same(answer: Answer, other: Answer) -> None:
     for field in dataclasses.fields(answer):
-        value, again = getattr(answer, field.name), getattr(other, field.name)
+        value, again = getattr(answer, field.name, None), getattr(other, field.name, None)
         for matrix, other_matrix in zip(sparse(value), sparse(again), strict=True):
             np.testing.assert_array_equal(matrix.toarray(), other_matrix.toarray())
         if isinstance(value, np.ndarray):
@@ -236,7 +236,7 @@ def test_an_answer_shows_arrays_by_shape_and_nothing_that_is_absent(
 
 def test_representations_are_as_one_writes_them(cloud: Any) -> None:
     answer = cloud.interpolate(VALUES, QUERIES, kernel="gauss", alpha=0.5)
-    assert repr(answer).startswith("Interpolation(values=array[2], diagnostics=Diagnostics(cloud_id=")
+    assert repr(answer) == "Interpolation(values=array[2], solver='dense')"
     kernel = answer.diagnostics.kernel
     assert repr(kernel) == f"KernelUsed(family='gauss', variance=1.0, length_scale={kernel.length_scale})"
     for written in [

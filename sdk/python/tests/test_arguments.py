@@ -460,7 +460,7 @@ def test_deviations_may_be_asked_for_by_their_own_name(method: str) -> None:
         {"std": True, "include": []},
         {"std": True, "include": "std"},
         {"include": "std"},
-        {"include": [gramian.GeometryInclude.STD], "std": False},
+        {"include": [gramian.GeometryAttribute.STD], "std": False},
     ]
     for arguments in said:
         assert sent(method, **arguments) == sent(method) | wanted
@@ -759,7 +759,7 @@ def test_a_geometry_may_be_of_another_cloud(method: str) -> None:
     other = cloud()
     other.description.cloud_id = "cd" * 32
     other.description.n_points = 5
-    reference = models.CloudRef(id=other.id)
+    reference = models.CloudInput(id=other.id)
     for geometry in [
         Surface(cloud=other),
         Surface(cloud=other.id),
@@ -794,7 +794,7 @@ def test_hyperparameters_are_sent_as_they_were_reported(method: str) -> None:
     learned = {"noise_deviation": 0.01, "of_a_later_version": [1, {"two": None}]}
     assert sent(method, hyperparameters=learned)["hyperparameters"] == learned
     assert sent(method, hyperparameters=MappingProxyType(learned))["hyperparameters"] == learned
-    model = models.Samples(count=3, seed=1)  # any model of the service
+    model = models.SampleOptions(count=3, seed=1)  # any model of the service
     assert sent(method, hyperparameters=model)["hyperparameters"] == {"count": 3, "seed": 1}
     with pytest.raises(
         TypeError, match=r"^hyperparameters is to be the diagnostics\.hyperparameters of an answer, not"

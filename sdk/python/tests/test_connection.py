@@ -103,7 +103,12 @@ def test_a_server_that_is_not_there_is_named() -> None:
     address = unused_address()
     with gramian.Client(address, retries=1) as client, pytest.raises(httpx.ConnectError) as caught:
         client.version()
-    assert caught.value.__notes__ == [f"There is no answer from {address}, see Client(base_url=…) or GRAMIAN_URL."]
+    assert str(caught.value).endswith(f"({address})")
+    (note,) = caught.value.__notes__
+    first, *ways = note.splitlines()
+    assert first == f"No service answers at {address}. Three ways on:"
+    expected = ["gramian.local()", f"gramian --bind {address.removeprefix('http://')}", "GRAMIAN_URL"]
+    assert all(part in way for part, way in zip(expected, ways, strict=True))
 
 
 def test_an_answer_that_breaks_off_is_asked_for_again() -> None:

@@ -21,10 +21,10 @@ import scipy.sparse
 
 import gramian
 from gramian import Cloud, InterpolationBatch, Kernel, KernelFamily, PosteriorBatch, Surface
-from gramian.answers import Answer
+from gramian.answers import Answer, Data
 from gramian.rest import models
 from gramian.rest.api.geometry import compute_normals
-from gramian.rest.models import CloudRef, NormalsRequest, NormalsResponse
+from gramian.rest.models import CloudInput, NormalsRequest, NormalsResponse
 from gramian.wire.tensors import Array, Format
 
 GAUSS = Kernel(family=KernelFamily.GAUSS, length_scale=2.0)
@@ -111,7 +111,7 @@ def lists(cloud: Cloud) -> Array:
 
 def members(answer: object) -> dict[str, object]:
     assert dataclasses.is_dataclass(answer)
-    return {field.name: getattr(answer, field.name) for field in dataclasses.fields(answer)}
+    return {field.name: getattr(answer, field.name, None) for field in dataclasses.fields(answer)}
 
 
 @pytest.mark.parametrize("operation", OPERATIONS.values(), ids=OPERATIONS.keys())
@@ -138,7 +138,7 @@ def assert_equal(binary: dict[str, object], text: dict[str, object]) -> None:
                 assert (matrix != other_matrix).nnz == 0
         elif name == "fit":
             assert repr(value) == repr(other)
-        elif isinstance(value, Answer):
+        elif isinstance(value, Answer | Data):
             assert_equal(members(value), members(other))
         else:
             assert value == other, name
@@ -158,13 +158,10 @@ def test_answers_have_the_documented_shapes(client: gramian.Client) -> None:
     assert cloud.laplace_beltrami_matrix(queries).matrix.shape == (7, 50)
     assert cloud.surface_gradient_matrix(queries).matrices.shape == (3, 7, 50)
     answer = cloud.interpolate(np.ones(50), queries, derivatives=2)
-    assert answer.gradients is not None
-    assert answer.hessians is not None
     assert (answer.gradients.shape, answer.hessians.shape) == ((7, 3), (7, 3, 3))
     posterior = cloud.posterior(np.ones(50), queries, include=[gramian.PosteriorQuantity.COVARIANCE], alpha=0.1)
-    assert posterior.covariance is not None
     assert posterior.covariance.shape == (7, 7)
-    assert posterior.variances is None
+    assert not hasattr(posterior, "variances")
 
 
 def test_measured_values_need_no_parameters(client: gramian.Client) -> None:
@@ -174,21 +171,16 @@ def test_measured_values_need_no_parameters(client: gramian.Client) -> None:
     points = np.column_stack([np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn), z])
     sphere, values = client.cloud(points), 20 + z + 0.02 * random.normal(size=300)
     answer = sphere.interpolate(values, points[:40], derivatives=2, std=True)
-    assert answer.value_std is not None
-    assert answer.gradient_std is not None
-    assert answer.hessian_std is not None
     assert answer.gradient_std.shape == (40, 3)
     assert answer.hessian_std.shape == (40, 3, 3)
     assert np.all(np.abs(answer.values - 20 - z[:40]) < 4 * answer.value_std)
     assert answer.fit["mean"] == "constant"
     laplacian = sphere.laplace_beltrami(values, std=True)
-    assert laplacian.laplacian_std is not None
     within = np.abs(laplacian.laplacians + 2 * z) < 1.96 * laplacian.laplacian_std
     assert within.mean() > 0.88
     gradient = sphere.surface_gradient(values, include="std", mean="linear")
-    assert gradient.gradient_std is not None
     assert gradient.gradient_std.shape == (300, 3)
-    assert sphere.surface_gradient(values, kernel="matern").gradient_std is None
+    assert not hasattr(sphere.surface_gradient(values, kernel="matern"), "gradient_std")
 
 
 def test_a_batch_answers_what_each_list_alone_does(client: gramian.Client) -> None:
@@ -226,7 +218,6 @@ def test_so_does_a_batch_of_posteriors(client: gramian.Client) -> None:
     assert_shapes(answer, means=(2, 6), gradients=(2, 6, 2), samples=(2, 4, 6), quantiles=(2, 3, 6))
     assert_shapes(answer, exceedance_probabilities=(2, 6), log_marginal_likelihoods=(2,), mean_coefficients=(2, 1))
     assert_shapes(answer, variances=(6,), observation_variances=(6,), covariance=(6, 6), gradient_variances=(6, 2))
-    assert answer.log_marginal_likelihoods is not None
     for i, of_one in enumerate(values):
         single = cloud.posterior(
             of_one,
@@ -243,6 +234,7 @@ def test_so_does_a_batch_of_posteriors(client: gramian.Client) -> None:
     plain = cloud.posterior_batch(values, queries, kernel=GAUSS)
     assert [name for name, value in members(plain).items() if value is not None] == [
         "positions",
+        "data",
         "means",
         "diagnostics",
         "fit",
@@ -296,7 +288,6 @@ def test_a_selection_finds_what_explains_values(client: gramian.Client) -> None:
     densities = -0.5 * errors**2 - 0.5 * np.log(2 * np.pi * found.leave_one_out.variances)
     np.testing.assert_allclose(found.leave_one_out.log_predictive_densities, densities, rtol=1e-9)
     others = client.cloud(points[1:]).posterior(values[1:], points[:1], include="observation_variances", **found.fit)
-    assert others.observation_variances is not None
     assert others.means[0] == pytest.approx(found.leave_one_out.means[0], abs=1e-6)
     assert others.observation_variances[0] == pytest.approx(found.leave_one_out.variances[0], rel=1e-6)
 
@@ -355,23 +346,19 @@ def test_deviations_are_there_where_they_are_asked_for(client: gramian.Client) -
     answer = cloud.curvatures(queries, std=True)
     deviations = [answer.normal_std, answer.mean_curvature_std, answer.gaussian_curvature_std]
     for numbers, of_what in zip(deviations, [answer.mean_curvatures] * 3, strict=True):
-        assert numbers is not None
         assert numbers.shape == (8,)
         assert (np.isnan(of_what) <= np.isnan(numbers)).all()
         assert (numbers[:7] > 0).all()
-    assert answer.principal_curvature_std is not None
     assert answer.principal_curvature_std.shape == (8, 2)
-    assert answer.mean_curvature_std is not None
     errors = np.abs(answer.mean_curvatures[:7] - 1) / answer.mean_curvature_std[:7]
     assert np.median(errors) < 2
     assert answer.diagnostics.solver is gramian.SolverUsed.LOCAL
     assert answer.diagnostics.noise_deviation == pytest.approx(0.01, rel=0.3)
     normals = cloud.normals(queries, include="std")
-    assert normals.normal_std is not None
     assert normals.normal_std.shape == (8,)
     plain = cloud.curvatures(queries)
-    assert plain.normal_std is plain.principal_curvature_std is plain.mean_curvature_std is None
-    assert cloud.normals(queries).normal_std is None
+    assert not any(hasattr(plain, name) for name in ("normal_std", "principal_curvature_std", "mean_curvature_std"))
+    assert not hasattr(cloud.normals(queries), "normal_std")
 
 
 @pytest.mark.parametrize("format_", ["safetensors", "json"])
@@ -387,7 +374,7 @@ def test_sparse_matrices_are_those_of_scipy(format_: Format) -> None:
     tangents = np.array([-np.sin(angles[:5]), np.cos(angles[:5])])
     found = np.array([matrix @ np.sin(angles) for matrix in gradient.matrices])
     np.testing.assert_allclose(found, np.cos(angles[:5]) * tangents, atol=1e-4)
-    assert repr(laplace).startswith("LaplaceBeltramiSparseMatrix(matrix=csr_matrix[200, 200], flags=()")
+    assert repr(laplace).startswith("LaplaceBeltramiSparseMatrix(matrix=csr_matrix[200, 200], ")
 
 
 def test_without_scipy_an_error_says_what_is_missing(circle: Array) -> None:
@@ -649,7 +636,7 @@ def cloud_kernel(cloud: Cloud) -> Kernel:
 def test_the_generated_client_serves_asyncio(client: gramian.Client, circle: Array) -> None:
     async def ask() -> object:
         async with client.rest as rest:
-            return await compute_normals.asyncio(client=rest, body=NormalsRequest(cloud=CloudRef(id=cloud.id)))
+            return await compute_normals.asyncio(client=rest, body=NormalsRequest(cloud=CloudInput(id=cloud.id)))
 
     cloud = client.cloud(circle)
     answer = asyncio.run(ask())
@@ -669,8 +656,6 @@ def test_every_axis_may_have_a_length_scale_of_its_own(format_: Format, circle: 
     answer = cloud.interpolate(circle[:, 0], queries, derivatives=2, kernel=Kernel("matern", length_scales=scales))
     single = scaled.interpolate(circle[:, 0], queries / scales, derivatives=2, kernel=Kernel("matern", length_scale=1))
     np.testing.assert_allclose(answer.values, single.values, rtol=1e-9)
-    assert answer.gradients is not None
-    assert single.gradients is not None
     np.testing.assert_allclose(answer.gradients * scales, single.gradients, atol=1e-9)
     used = answer.diagnostics.kernel
     assert (used.length_scale, used.length_scales) == (gramian.UNSET, [2.0, 0.5])

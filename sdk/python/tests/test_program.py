@@ -56,6 +56,15 @@ def test_the_program_is_found(package: str, folder: str, tmp_path: Path, monkeyp
     assert find_program() == expected
 
 
+def test_a_clone_uses_what_cargo_has_built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(program, "PACKAGE", tmp_path / "clone/sdk/python/src/gramian")
+    made(tmp_path / "path/gramian")
+    expected = made(tmp_path / "clone/target/release/gramian")
+    assert find_program() == tmp_path / "path/gramian"  # not a clone yet
+    (tmp_path / "clone/Cargo.toml").touch()
+    assert find_program() == expected
+
+
 def test_the_program_of_the_same_installation_is_preferred(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     package, folder = LAYOUTS["beside the package in an environment"]
     monkeypatch.setattr(program, "PACKAGE", tmp_path / package)

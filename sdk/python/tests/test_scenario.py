@@ -16,7 +16,7 @@ from gramian.rest.api.operators import assemble_laplace_beltrami_matrix
 from gramian.rest.api.values import compute_posterior
 from gramian.rest.models import (
     Cloud,
-    CloudRef,
+    CloudInput,
     CloudRequest,
     CurvaturesRequest,
     CurvaturesResponse,
@@ -47,7 +47,7 @@ def client() -> Iterator[Client]:
 
 
 @pytest.fixture(scope="module")
-def cloud(client: Client) -> CloudRef:
+def cloud(client: Client) -> CloudInput:
     registered = create_cloud.sync(client=client, body=CloudRequest(points=CIRCLE))
     assert isinstance(registered, Cloud)
     assert (registered.n_points, registered.dimension, registered.n_duplicates) == (8, 2, 0)
@@ -55,10 +55,10 @@ def cloud(client: Client) -> CloudRef:
     assert not isinstance(registered.spacing, Unset)
     assert registered.spacing.median == pytest.approx(2 * math.sin(math.pi / 8))
     assert registered.created_at.tzinfo is not None
-    return CloudRef(id=registered.cloud_id)
+    return CloudInput(id=registered.cloud_id)
 
 
-def test_curvatures_with_a_null_entry(client: Client, cloud: CloudRef) -> None:
+def test_curvatures_with_a_null_entry(client: Client, cloud: CloudInput) -> None:
     request = CurvaturesRequest(cloud=cloud, kernel=GAUSS, alpha=0.0, queries=[[1.0, 0.0], [0.0, 0.0]])
     answer = compute_curvatures.sync(client=client, body=request)
     assert isinstance(answer, CurvaturesResponse)
@@ -81,7 +81,7 @@ def test_curvatures_with_a_null_entry(client: Client, cloud: CloudRef) -> None:
     assert answer.diagnostics.alpha == 0.0
 
 
-def test_laplace_beltrami_matrix(client: Client, cloud: CloudRef) -> None:
+def test_laplace_beltrami_matrix(client: Client, cloud: CloudInput) -> None:
     request = LaplaceBeltramiMatrixRequest(cloud=cloud, kernel=GAUSS, alpha=0.0)
     answer = assemble_laplace_beltrami_matrix.sync(client=client, body=request)
     assert isinstance(answer, LaplaceBeltramiMatrixResponse)
@@ -94,7 +94,7 @@ def test_laplace_beltrami_matrix(client: Client, cloud: CloudRef) -> None:
         assert sum(x * y for x, y in zip(row, COSINES, strict=True)) == pytest.approx(-cosine, abs=1e-5)
 
 
-def test_posterior_with_variance(client: Client, cloud: CloudRef) -> None:
+def test_posterior_with_variance(client: Client, cloud: CloudInput) -> None:
     request = PosteriorRequest(
         cloud=cloud,
         values=COSINES,
@@ -113,7 +113,7 @@ def test_posterior_with_variance(client: Client, cloud: CloudRef) -> None:
     assert isinstance(answer.covariance, Unset)
 
 
-def test_a_422_is_a_problem_with_a_pointer(client: Client, cloud: CloudRef) -> None:
+def test_a_422_is_a_problem_with_a_pointer(client: Client, cloud: CloudInput) -> None:
     request = CurvaturesRequest(cloud=cloud, kernel=Kernel(family=KernelFamily.GAUSS, length_scale=-1.0))
     response = compute_curvatures.sync_detailed(client=client, body=request)
     assert response.status_code is HTTPStatus.UNPROCESSABLE_ENTITY

@@ -143,7 +143,7 @@ def test_a_connection_lost_too_often_is_an_error() -> None:
     with pytest.raises(httpx.ConnectError) as caught:
         connection.send("GET", "/version")
     assert len(requests) == 3
-    assert "no answer from http://service" in caught.value.__notes__[0]
+    assert "No service answers at http://service" in caught.value.__notes__[0]
     handle, requests = service(httpx.ConnectError("gone"))
     connection, waits = connect(handle, max_wait=0.05)
     with pytest.raises(httpx.ConnectError):

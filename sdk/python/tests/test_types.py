@@ -14,13 +14,17 @@ from pathlib import Path
 from typing import Any, Literal, get_args, get_type_hints
 
 import attrs
+import numpy as np
 import pytest
 
-from gramian import rest
+import gramian
+from gramian import answers, rest
+from gramian.answers.asked import Asked
 from gramian.arguments import fit, keywords, options
 from gramian.resources import selection
 from gramian.rest import api, models
 from gramian.rest.types import File, Response, Unset
+from gramian.wire.tensors import Array
 
 MODELS = [getattr(models, name) for name in models.__all__]
 OBJECTS = [model for model in MODELS if attrs.has(model)]
@@ -73,10 +77,10 @@ def test_no_argument_or_result_is_any() -> None:
 
 
 def test_requests_have_no_later_members() -> None:
-    sent = [models.CloudRef, models.Kernel, models.Surface, models.Samples, models.FreeParameter]
+    sent = [models.CloudInput, models.Kernel, models.Surface, models.SampleOptions, models.FreeParameter]
     sent += [models.MeshBounds]
     sent += [models.Hyperparameters, models.MeansLevel, models.NoiseRatio]  # as they were answered
-    sent += [models.Region, models.Border, models.TileRegions, models.Link]
+    sent += [models.Region, models.RegionAdjacency, models.TileRegions, models.RegionOverlap]
     for model in OBJECTS:
         is_request = model.__name__.endswith("Request") or model in sent
         if model is models.EstimateRequest:  # has the members of whichever request is meant
@@ -101,7 +105,7 @@ def test_enumerations_are_enumerations() -> None:
     assert hints["factorization"] is models.FactorizationUsed
     assert fields(models.Warning_)["code"] is models.WarningCode
     assert fields(models.PosteriorRequest)["include"] == list[models.PosteriorQuantity] | Unset
-    assert fields(models.NormalsRequest)["include"] == list[models.GeometryInclude] | Unset
+    assert fields(models.NormalsRequest)["include"] == list[models.GeometryAttribute] | Unset
 
 
 def test_nullable_entries_are_nullable_and_nothing_else_is() -> None:
@@ -123,7 +127,7 @@ def test_nullable_entries_are_nullable_and_nothing_else_is() -> None:
     nullable = {model.__name__ for model in OBJECTS for hint in fields(model).values() if type(None) in parts(hint)}
     # A matrix that is not positive definite has no score. A point on which the mean depends has no
     # prediction.
-    others = {"PathEntry", "FamilyScore", "LeftOut"}
+    others = {"AlphaScore", "FamilyScore", "LeaveOneOutPredictions"}
     assert all(name.endswith("Response") for name in nullable - others)
     assert not nullable & {"InterpolationResponse", "PosteriorResponse", "LaplaceBeltramiSparseMatrixResponse"}
 
@@ -173,3 +177,40 @@ def test_every_option_is_described() -> None:
 
 def test_what_may_be_free_is_the_enumeration() -> None:
     assert set(selection.Bounds.__annotations__) == {member.value for member in models.SelectionParameter}
+
+
+def band(answer: gramian.Posterior) -> Array:
+    """Returns the width of a band. mypy checks that variances are an array, not an array or None."""
+    return 2 * 1.96 * np.sqrt(answer.variances)
+
+
+def test_members_that_a_request_asks_for_are_never_none_to_a_type_checker() -> None:
+    line = gramian.Client().cloud([[0.0], [1.0], [2.0]])
+    assert band(line.posterior([0.0, 1.0, 0.0], [[0.5]], include="variances", kernel="gauss", alpha=0.1)).shape == (1,)
+    kinds = [getattr(answers, name) for name in answers.__all__]
+    found = {(kind.__name__, name): how for kind in kinds for name, how in vars(kind).items() if isinstance(how, Asked)}
+    assert len(found) > 30
+    for kind, name in found:
+        hint = inspect.get_annotations(getattr(answers, kind))[name]
+        assert hint in ("Array", "float"), (kind, name)
+
+
+def test_how_to_ask_is_what_the_methods_take() -> None:
+    methods = {
+        answers.Interpolation: "interpolate",
+        answers.InterpolationBatch: "interpolate_batch",
+        answers.Posterior: "posterior",
+        answers.PosteriorBatch: "posterior_batch",
+        answers.Normals: "normals",
+        answers.Curvatures: "curvatures",
+        answers.SurfaceGradient: "surface_gradient",
+        answers.LaplaceBeltrami: "laplace_beltrami",
+    }
+    cloud = gramian.Client().cloud(np.random.default_rng(0).normal(size=(40, 2)))
+    for kind, method in methods.items():
+        asked = {name: how.how for name, how in vars(kind).items() if isinstance(how, Asked)}
+        values = np.arange(40.0) if method.endswith("batch") is False else np.arange(80.0).reshape(2, 40)
+        given = {} if kind in (answers.Normals, answers.Curvatures) else {"values": values}
+        for name, how in asked.items():
+            answer = getattr(cloud, method)(**given, queries=[[0.1, 0.2]], **eval(f"dict({how})"))
+            assert hasattr(answer, name), (method, how)

@@ -2,7 +2,7 @@
 
 use std::error::Error as StdError;
 
-use gramian_client::types::{self, CloudId, CloudRef, Kernel, KernelFamily, PosteriorQuantity};
+use gramian_client::types::{self, CloudId, CloudInput, Kernel, KernelFamily, PosteriorQuantity};
 use gramian_client::{Client, Error};
 
 /// Eight points of the unit circle.
@@ -98,8 +98,8 @@ async fn a_refusal_names_the_field(client: &Client, id: &CloudId) {
     assert_eq!(problem.errors[0].pointer, "/kernel/length_scale");
 }
 
-fn cloud(id: &CloudId) -> types::builder::CloudRef {
-    CloudRef::builder().id(Some(id.clone()))
+fn cloud(id: &CloudId) -> types::builder::CloudInput {
+    CloudInput::builder().id(Some(id.clone()))
 }
 
 /// Returns the Gaussian kernel exp(−r²/ℓ²).

@@ -3,7 +3,7 @@
 use gramian_host::wire::read::tensors::npy::Npy;
 
 use super::FileCloud;
-use super::columns::{Columns, Places};
+use super::columns::{Columns, POSITIONS, Places};
 use super::records::ends_early;
 
 const MAX_HEADER_BYTES: usize = 64 << 10;
@@ -59,7 +59,11 @@ fn transposed(numbers: &[f64], n: usize) -> Vec<f64> {
 
 /// A cloud of rows with any number of coordinates.
 fn checked(points: Vec<f64>, dimension: usize) -> Result<FileCloud, String> {
-    let names = (0..dimension).map(|axis| format!("coordinate {}", axis + 1)).collect();
+    let name = |axis: usize| match POSITIONS.get(axis) {
+        Some(&name) if dimension <= POSITIONS.len() => name.to_owned(),
+        _ => format!("coordinate {}", axis + 1),
+    };
+    let names = (0..dimension).map(name).collect();
     let numbers = (0..dimension).map(|axis| points.iter().skip(axis).step_by(dimension).copied().collect());
     let columns = Columns { names, numbers: numbers.collect(), places: Places::Records("point") };
     columns.check_finite(&(0..dimension).collect::<Vec<_>>())?;

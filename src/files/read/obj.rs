@@ -1,14 +1,15 @@
 //! OBJ: the vertices of a mesh, with the colours and normals that they may have.
 
+use super::FileCloud;
 use super::columns::{Columns, Gaps, NORMALS, Places};
 use super::records::number_of;
-use super::{FileCloud, text_of};
 
 /// Reads vertices (`v`), and normals (`vn`) if every vertex has one: as many in the same order, or named by
 /// the faces. Everything else is skipped.
 pub fn read(bytes: &[u8]) -> Result<FileCloud, String> {
     let mut mesh = Mesh::default();
-    for (at, line) in text_of(bytes)?.lines().enumerate() {
+    // Comments and names may be in any encoding.
+    for (at, line) in String::from_utf8_lossy(bytes).lines().enumerate() {
         let mut words = line.split_ascii_whitespace();
         let keyword = words.next().unwrap_or_default();
         let refused = |reason| format!("line {}: {reason}", at + 1);

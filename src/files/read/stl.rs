@@ -2,9 +2,9 @@
 
 use std::collections::HashSet;
 
+use super::FileCloud;
 use super::columns::{Columns, Gaps, POSITIONS, Places};
 use super::records::{ends_early, number_of};
-use super::{FileCloud, text_of};
 
 /// Bytes before the number of facets.
 const N_TITLE_BYTES: usize = 80;
@@ -21,7 +21,7 @@ pub fn read(bytes: &[u8]) -> Result<FileCloud, String> {
     let head = String::from_utf8_lossy(&bytes[..bytes.len().min(1024)]);
     let is_text =
         head.trim_start().starts_with("solid") && (head.contains("facet") || head.contains("endsolid"));
-    if is_text { of_text(text_of(bytes)?) } else { of_facets(bytes) }
+    if is_text { of_text(&String::from_utf8_lossy(bytes)) } else { of_facets(bytes) }
 }
 
 /// Distinct corners in the order of the file.

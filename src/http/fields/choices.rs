@@ -107,7 +107,7 @@ pub enum OrientationChoice {
 /// Optional parts of an answer about values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum ValuesInclude {
+pub enum ValueAttribute {
     /// Standard deviations, given the values.
     Std,
 }
@@ -119,7 +119,7 @@ pub enum ValuesInclude {
 /// too. Any other query is a place that is known exactly.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum GeometryInclude {
+pub enum GeometryAttribute {
     /// Standard deviations.
     Std,
     /// The normals of both sheets at sharp edges. Takes local regressions.

@@ -184,7 +184,7 @@ pub struct Diagnostics {
     pub n_merged_duplicates: usize,
     /// Number of rows of a sparse operator by how their weights were computed.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub stencils: Option<StencilsUsed>,
+    pub stencils: Option<StencilCounts>,
     /// Changes that were made, and limits of the accuracy.
     pub warnings: Vec<Warning>,
     /// Diagnostics of the fit of the surface, in answers about values on a surface.
@@ -195,7 +195,7 @@ pub struct Diagnostics {
 
 /// Number of rows of a sparse operator by how their weights were computed.
 #[derive(Debug, Clone, Copy, Serialize, ToSchema)]
-pub struct StencilsUsed {
+pub struct StencilCounts {
     /// Polyharmonic splines on the nearest nodes: the ordinary row.
     pub nearest: usize,
     /// Polyharmonic splines on nodes that thin out with distance, used where the nearest nodes lie on one
@@ -210,7 +210,7 @@ pub struct StencilsUsed {
     pub empty: usize,
 }
 
-impl StencilsUsed {
+impl StencilCounts {
     pub fn of(stencils: &Stencils) -> Self {
         Self {
             nearest: stencils.n_rows(RowKind::Nearest),

@@ -4,7 +4,7 @@ use serde::Deserialize;
 use utoipa::ToSchema;
 
 use super::choices::{DuplicatePolicy, MeanChoice, SolverChoice, SurfaceModelChoice};
-use super::cloud_ref::CloudRef;
+use super::cloud_input::CloudInput;
 use super::hyperparameters::Hyperparameters;
 use super::kernel::Kernel;
 use gramian_host::wire::read::members::present_unless_empty;
@@ -17,7 +17,7 @@ use gramian_host::wire::read::points::Points;
 #[serde(deny_unknown_fields)]
 pub struct Surface {
     /// The cloud whose level surface carries the operator.
-    pub cloud: Option<CloudRef>,
+    pub cloud: Option<CloudInput>,
     /// The kernel of the signature function of the surface.
     pub kernel: Option<Kernel>,
     /// Added to the diagonal of the Gram matrix of the surface.
@@ -35,9 +35,9 @@ pub struct Surface {
 
 /// A request about a cloud.
 pub trait HasCloud {
-    fn cloud(&self) -> &CloudRef;
+    fn cloud(&self) -> &CloudInput;
 
-    fn cloud_mut(&mut self) -> &mut CloudRef;
+    fn cloud_mut(&mut self) -> &mut CloudInput;
 
     /// The kernel of the request, its noise, and its solver.
     fn process(&self) -> GivenProcess<'_>;
@@ -46,7 +46,7 @@ pub trait HasCloud {
     fn may_merge(&self) -> bool;
 
     /// The cloud of the surface, where it may differ from that of the values.
-    fn surface_cloud(&self) -> Option<&CloudRef> {
+    fn surface_cloud(&self) -> Option<&CloudInput> {
         None
     }
 }
@@ -63,7 +63,7 @@ pub struct GivenProcess<'a> {
 /// The fields that determine a fit, moved out of a request.
 #[derive(Debug, Default)]
 pub struct Fit {
-    pub cloud: CloudRef,
+    pub cloud: CloudInput,
     pub kernel: Option<Kernel>,
     pub alpha: Option<f64>,
     pub noise_variances: Option<Vec<f64>>,
@@ -93,7 +93,7 @@ macro_rules! request {
         #[serde(deny_unknown_fields)]
         pub struct $name {
             /// The points at which values are known, or that sample the surface.
-            pub cloud: $crate::http::fields::CloudRef,
+            pub cloud: $crate::http::fields::CloudInput,
             /// The kernel. If absent, it is chosen.
             ///
             /// A surface's kernel is chosen from the cloud. A kernel for values is chosen by their
@@ -128,11 +128,11 @@ macro_rules! request {
         }
 
         impl $crate::http::fields::HasCloud for $name {
-            fn cloud(&self) -> &$crate::http::fields::CloudRef {
+            fn cloud(&self) -> &$crate::http::fields::CloudInput {
                 &self.cloud
             }
 
-            fn cloud_mut(&mut self) -> &mut $crate::http::fields::CloudRef {
+            fn cloud_mut(&mut self) -> &mut $crate::http::fields::CloudInput {
                 &mut self.cloud
             }
 
@@ -149,7 +149,7 @@ macro_rules! request {
                 }
             }
 
-            $(fn surface_cloud(&self) -> Option<&$crate::http::fields::CloudRef> {
+            $(fn surface_cloud(&self) -> Option<&$crate::http::fields::CloudInput> {
                 self.$surface.as_ref()?.cloud.as_ref()
             })?
         }

@@ -3,7 +3,7 @@
 pub mod kernel;
 
 mod choices;
-mod cloud_ref;
+mod cloud_input;
 mod diagnostics;
 mod fit;
 mod hyperparameters;
@@ -11,12 +11,12 @@ pub mod limits;
 pub mod schemas;
 
 pub use choices::{
-    DuplicatePolicy, GeometryInclude, MeanChoice, OrientationChoice, SolverChoice, SurfaceModelChoice,
-    SurfaceModelUsed, ValuesInclude,
+    DuplicatePolicy, GeometryAttribute, MeanChoice, OrientationChoice, SolverChoice, SurfaceModelChoice,
+    SurfaceModelUsed, ValueAttribute,
 };
-pub use cloud_ref::CloudRef;
+pub use cloud_input::CloudInput;
 pub use diagnostics::{
-    Diagnostics, FactorizationUsed, Flag, FlagReason, SolverUsed, StencilsUsed, Warning, WarningCode,
+    Diagnostics, FactorizationUsed, Flag, FlagReason, SolverUsed, StencilCounts, Warning, WarningCode,
 };
 pub(crate) use fit::request;
 pub use fit::{Fit, GivenProcess, HasCloud, Surface};

@@ -5,7 +5,7 @@ use utoipa::openapi::RefOr;
 use utoipa::openapi::schema::{Object, Schema, SchemaType, Type};
 
 /// Optional members that may be null. They are always sent, null where a score has no value.
-const NULLABLE: [(&str, &str); 2] = [("FamilyScore", "score"), ("PathEntry", "score")];
+const NULLABLE: [(&str, &str); 2] = [("FamilyScore", "score"), ("AlphaScore", "score")];
 
 /// Removes null from the types of all optional members.
 pub fn refuse_null(document: &mut utoipa::openapi::OpenApi) {

@@ -14,7 +14,7 @@ use super::plan::Lack;
 use super::planner::{GivenValues, Planner};
 use super::steps::{estimate, serve};
 use crate::config::Config;
-use crate::http::fields::{CloudRef, Fit, SolverChoice};
+use crate::http::fields::{CloudInput, Fit, SolverChoice};
 use crate::http::problem::Problem;
 use crate::http::problem::catalogue;
 use crate::http::routes::surface::normals::NormalsRequest;
@@ -69,7 +69,7 @@ fn outcome(response: &Response) -> CacheOutcome {
 
 fn fit(n: usize, solver: SolverChoice) -> Fit {
     let points = Points { n_rows: n, dimension: 2, coordinates: circle(n).concat(), ragged: None };
-    Fit { cloud: CloudRef { points: Some(points), ..CloudRef::default() }, solver, ..Fit::default() }
+    Fit { cloud: CloudInput { points: Some(points), ..CloudInput::default() }, solver, ..Fit::default() }
 }
 
 #[tokio::test]

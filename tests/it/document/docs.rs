@@ -2,12 +2,14 @@
 //!
 //! - The examples of docs/api.md are those of the OpenAPI document, and its tables are complete.
 //! - The settings in docs/operations.md are those of the process.
+//! - The generators in sdk/README.md are those that are tested, and every operation is sized.
 //! - Links lead somewhere.
 //! - The README is short.
 //!
 //! A comment before each JSON block names a file, a pointer into it, and members left out:
 //! `<!-- openapi/examples/compute_normals.json /response without diagnostics -->`.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -200,6 +202,54 @@ fn every_setting_is_in_the_table() {
         .collect();
     assert_eq!(listed, expected);
     assert_eq!(listed.len(), command.get_arguments().filter(|setting| setting.get_env().is_some()).count());
+}
+
+/// The table of generators in sdk/README.md has the clients that `sdk/test` tests, in its order.
+#[test]
+fn every_generator_is_in_the_table() {
+    let page = std::fs::read_to_string(at_root("sdk/README.md")).unwrap();
+    let rows = page.lines().filter(|line| line.contains(" | 3.1 | ") || line.contains(" | 3.0"));
+    let listed: Vec<_> = rows
+        .map(|row| {
+            let cells: Vec<_> = row.trim_matches('|').split(" | ").map(str::trim).collect();
+            assert!(cells.len() == 5 && cells.iter().all(|cell| !cell.is_empty()), "{cells:?}");
+            cells[3].strip_prefix('[').and_then(|link| link.split(']').next()).unwrap().to_owned()
+        })
+        .collect();
+    let script = std::fs::read_to_string(at_root("sdk/test")).unwrap();
+    let lists = ["quick=(", "long=("].map(|name| {
+        let list = script.split(name).nth(1).and_then(|rest| rest.split(')').next()).unwrap();
+        list.split_whitespace().map(str::to_owned).collect::<Vec<_>>()
+    });
+    assert_eq!(listed, lists.concat());
+    assert_eq!(listed.into_iter().collect::<BTreeSet<_>>(), folders_with_a_test("sdk"));
+}
+
+fn folders_with_a_test(folder: &str) -> BTreeSet<String> {
+    let entries = std::fs::read_dir(at_root(folder)).unwrap().map(|entry| entry.unwrap());
+    let tested = entries.filter(|entry| entry.path().join("test").is_file());
+    tested.map(|entry| entry.file_name().into_string().unwrap()).collect()
+}
+
+/// `bench/sizing` measures every operation that computes, and the table that it writes has one row for each.
+#[test]
+fn every_operation_is_sized() {
+    let document = crate::support::document();
+    let names = document.pointer("/components/schemas/OperationName/enum").unwrap().as_array().unwrap();
+    let names: Vec<_> = names.iter().map(|name| name.as_str().unwrap()).collect();
+    let script = std::fs::read_to_string(at_root("bench/sizing")).unwrap();
+    let rows = script.lines().filter_map(|line| line.strip_prefix("    \"")?.split_once("\": ["));
+    let measured: BTreeSet<_> = rows.map(|(name, _)| name).collect();
+    assert_eq!(measured, names.iter().copied().collect());
+
+    let page = std::fs::read_to_string(at_root("docs/operations.md")).unwrap();
+    let table = page.split("of bench/sizing -->").nth(1).unwrap();
+    let sized: BTreeSet<_> =
+        table.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next()).collect();
+    let paths = document["paths"].as_object().unwrap().iter();
+    let paths = paths.filter(|(_, item)| names.iter().any(|name| item["post"]["operationId"] == **name));
+    // Empty until it is measured on a quiet machine.
+    assert!(sized.is_empty() || sized == paths.map(|(path, _)| path.as_str()).collect(), "{sized:?}");
 }
 
 #[test]

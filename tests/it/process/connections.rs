@@ -419,8 +419,8 @@ async fn a_body_that_is_announced_as_too_large_is_refused_before_it_is_read() {
 #[tokio::test]
 async fn an_answer_before_its_body_is_read_ends_the_connection_only_if_it_says_so() {
     let server = Server::start().await;
-    // No request has a media type, so the head is enough to refuse it.
-    let head = "POST /v1/clouds HTTP/1.1\r\nHost: x\r\n";
+    // No request has a media type of the service, so the head is enough to refuse it.
+    let head = "POST /v1/clouds HTTP/1.1\r\nHost: x\r\nContent-Type: text/plain\r\n";
     let spaces = " ".repeat(3000);
     let known = format!("{head}Content-Length: 3000\r\n\r\n");
     let chunk = format!("bb8\r\n{spaces}\r\n");

@@ -5,8 +5,8 @@ use std::collections::{BTreeSet, HashMap};
 use reqwest::Method;
 use serde_json::{Value, json};
 
-use crate::all_routes::ROUTES;
-use crate::support::{Server, fibonacci_sphere};
+use crate::all_routes::{ROUTES, route_of};
+use crate::support::{Server, fibonacci_sphere, unpooled};
 
 #[tokio::test]
 async fn unknown_paths_are_problems_too() {
@@ -195,13 +195,14 @@ async fn bodies_are_announced_as_what_they_are() {
             server.send(request).await
         };
         for refused in [
-            &[][..],
-            &[("content-type", "")],
-            &[("content-type", "text/plain")],
+            &[("content-type", "text/plain")][..],
             &[("content-type", "application/octet-stream")],
             &[("content-type", "application/problem+json")],
             &[("content-type", "application/json"), ("content-encoding", "br")],
             &[("content-type", "application/json"), ("content-encoding", "gzip, zstd")],
+            &[("content-encoding", "gzip")],
+            // A page of another origin needs no permission to send a body without a type.
+            &[("origin", "https://elsewhere.example")],
         ] {
             send(refused).await.expect_problem(415, "unsupported-media-type");
         }
@@ -221,10 +222,39 @@ async fn bodies_are_announced_as_what_they_are() {
             &[("content-type", "application/json")][..],
             &[("content-type", "Application/JSON; charset=utf-8")],
             &[("content-type", "application/json"), ("content-encoding", "identity")],
+            // A body without a type that begins with `{` is JSON.
+            &[],
+            &[("content-type", "")],
         ] {
             assert!([200, 201].contains(&send(accepted).await.status), "{path} {accepted:?}");
         }
     }
+}
+
+#[tokio::test]
+async fn a_body_without_a_type_is_an_object_or_refused() {
+    let server = Server::start().await;
+    let object = json!({"points": [[1, 2]]}).to_string();
+    let send =
+        async |body: String| server.send(server.client.post(server.url("/v1/clouds")).body(body)).await;
+    assert_eq!(send(format!(" \r\n\t{object}")).await.status, 201);
+    for refused in [
+        String::new(),
+        " ".to_owned(),
+        format!("[{object}]"),
+        "ply\n".to_owned(),
+        format!("\u{feff}{object}"),
+    ] {
+        let answer = send(refused).await;
+        let problem = answer.expect_problem(415, "unsupported-media-type");
+        assert!(problem["detail"].as_str().unwrap().contains("no Content-Type"), "{problem}");
+    }
+    // As a job it is the same request. The document has no 202, since that status depends on a header.
+    let request = unpooled().post(server.url("/v1/normals")).header("prefer", "respond-async");
+    let accepted = request.body(route_of("/v1/normals").request().to_string()).send().await.unwrap();
+    assert_eq!(accepted.status(), 202);
+    let result = format!("{}/result", accepted.headers()["location"].to_str().unwrap());
+    server.get(&result).await.expect_ok();
 }
 
 #[tokio::test]

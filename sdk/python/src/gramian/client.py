@@ -16,6 +16,7 @@ import numpy.typing as npt
 from . import rest
 from .arguments.arrays import Sizes
 from .arguments.fit import Whole
+from .arguments.geometries import GeometryLike, geometry_of
 from .arguments.keywords import suggest_names
 from .arguments.normalise import CLIENT, REQUEST, normalise
 from .arguments.registration import register, register_file
@@ -145,7 +146,7 @@ class Client:
 
     def cloud(
         self,
-        points: npt.ArrayLike | Table | str | os.PathLike[str] | bytes,
+        points: npt.ArrayLike | Table | GeometryLike | str | os.PathLike[str] | bytes,
         normals: npt.ArrayLike | None = None,
         *,
         columns: Sequence[str] | None = None,
@@ -158,10 +159,11 @@ class Client:
             A row of coordinates for each point, also on a line: `[[0.0], [0.5]]`. Or a PLY file, as scanners
             write it: a path that ends in `.ply`, or the bytes. Its vertices are the points, with their
             normals. The service reads the file, so that the cloud has no `points` here. Arrays of other
-            libraries are read through `__array__`.
+            libraries are read through `__array__`. Or a mesh or a cloud of trimesh, PyVista or Open3D: its
+            vertices are the points, with its normals if each vertex has one.
         normals : array_like, `[n, d]`, optional
-            Normals of any length but 0, if known. Their side is the outward one. Not allowed with a file,
-            which has normals itself.
+            Normals of any length but 0, if known. Their side is the outward one. They replace those of a mesh.
+            Not allowed with a file, which has normals itself.
         columns : sequence of str, optional
             Names of the coordinates, if `points` is a table: a DataFrame, a Dataset, a structured array or a
             dictionary of columns.
@@ -180,6 +182,9 @@ class Client:
             if normals is not None:
                 raise TypeError("normals are given with points: a PLY file has its own, as nx, ny and nz")
             return Cloud(self._connection, register_file(self._connection, file), file=file)
+        geometry = geometry_of(points)
+        if geometry is not None:
+            points, normals = geometry.positions, geometry.normals if normals is None else normals
         own_points = _own_array("points", cast("npt.ArrayLike", points))
         n, d = own_points.shape
         own_normals = None if normals is None else _own_array("normals", normals, {"n": n, "d": d})

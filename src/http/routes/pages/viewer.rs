@@ -8,18 +8,21 @@ use super::site::{File, INDEX, Site, files, packed};
 use crate::http::openapi::responses::ProbeProblems;
 use crate::http::problem::Problem;
 
-/// What the page may do: scripts, styles and requests of its own origin, and pictures that it makes.
-const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; \
-     connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+/// What the page may do: scripts, workers, styles and requests of its own origin, and pictures that it makes.
+const POLICY: &str = "default-src 'none'; script-src 'self'; worker-src 'self'; style-src 'self'; \
+     img-src 'self' blob: data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 static FILES: &[File] = files!["page":
     "index.html" HTML,
     "style.css" STYLE,
     "icon.svg" PICTURE,
     "main.js" SCRIPT,
+    "data/dragon.bin" NUMBERS,
     "control/asking.js" SCRIPT,
     "control/clouds.js" SCRIPT,
     "control/elements.js" SCRIPT,
+    "control/leaving/request.js" SCRIPT,
+    "control/leaving/saving.js" SCRIPT,
     "control/measuring.js" SCRIPT,
     "control/overlay.js" SCRIPT,
     "control/page.js" SCRIPT,
@@ -27,22 +30,31 @@ static FILES: &[File] = files!["page":
     "control/pointer.js" SCRIPT,
     "control/range.js" SCRIPT,
     "control/registered.js" SCRIPT,
-    "control/request.js" SCRIPT,
-    "control/saving.js" SCRIPT,
     "control/settings.js" SCRIPT,
-    "data/dragon.bin" NUMBERS,
     "model/examples.js" SCRIPT,
-    "model/export.js" SCRIPT,
     "model/files.js" SCRIPT,
+    "model/formats/arrays.js" SCRIPT,
+    "model/formats/columns.js" SCRIPT,
+    "model/formats/formats.js" SCRIPT,
+    "model/formats/las.js" SCRIPT,
+    "model/formats/lzf.js" SCRIPT,
+    "model/formats/meshes.js" SCRIPT,
+    "model/formats/pcd.js" SCRIPT,
+    "model/formats/ply.js" SCRIPT,
+    "model/formats/records.js" SCRIPT,
+    "model/leaving/export.js" SCRIPT,
+    "model/leaving/snippets.js" SCRIPT,
     "model/operations.js" SCRIPT,
     "model/section.js" SCRIPT,
     "model/service.js" SCRIPT,
-    "model/snippets.js" SCRIPT,
     "model/spacings.js" SCRIPT,
     "model/state.js" SCRIPT,
     "model/tables.js" SCRIPT,
     "model/tensors.js" SCRIPT,
     "model/turns.js" SCRIPT,
+    "reading/cleaning.js" SCRIPT,
+    "reading/client.js" SCRIPT,
+    "reading/worker.js" SCRIPT,
     "view/body.js" SCRIPT,
     "view/colours.js" SCRIPT,
     "view/extras.js" SCRIPT,
@@ -54,6 +66,9 @@ static FILES: &[File] = files!["page":
     "view/readout.js" SCRIPT,
     "view/scene.js" SCRIPT,
     "view/shading.js" SCRIPT,
+    "words/problems.js" SCRIPT,
+    "words/refusal.js" SCRIPT,
+    "words/warnings.js" SCRIPT,
     "vendor/three/OrbitControls.js" SCRIPT,
     "vendor/three/three.core.min.js" SCRIPT,
     "vendor/three/three.module.min.js" SCRIPT,

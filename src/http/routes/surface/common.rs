@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::http::fields::{Fit, GeometryInclude, OrientationChoice, SurfaceModelChoice};
+use crate::http::fields::{Fit, GeometryAttribute, OrientationChoice, SurfaceModelChoice};
 use crate::http::problem::Problem;
 use crate::http::problem::catalogue;
 use crate::http::serve::operation::Plan;
@@ -52,7 +52,7 @@ pub fn geometry_request(
     surface: Option<SurfaceModelChoice>,
     orientation: Option<OrientationChoice>,
     checks_curvatures: bool,
-    include: Option<&[GeometryInclude]>,
+    include: Option<&[GeometryAttribute]>,
 ) -> GeometryRequest {
     let has = |part| include.is_some_and(|include| include.contains(&part));
     GeometryRequest {
@@ -68,8 +68,8 @@ pub fn geometry_request(
         },
         checks_curvatures,
         max_offsets: MAX_OFFSETS,
-        has_deviations: has(GeometryInclude::Std),
-        has_edge_normals: has(GeometryInclude::EdgeNormals),
+        has_deviations: has(GeometryAttribute::Std),
+        has_edge_normals: has(GeometryAttribute::EdgeNormals),
     }
 }
 

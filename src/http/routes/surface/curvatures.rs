@@ -2,7 +2,7 @@
 
 use super::common::{GeometryWork, geometry_request, plan_geometry};
 use crate::http::fields::{
-    Diagnostics, Flag, GeometryInclude, OrientationChoice, SurfaceModelChoice, SurfaceModelUsed, request,
+    Diagnostics, Flag, GeometryAttribute, OrientationChoice, SurfaceModelChoice, SurfaceModelUsed, request,
 };
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
@@ -29,7 +29,7 @@ request! {
         /// The direction of normals, which determines the sign of curvatures. Default: `outward`.
         pub orientation: Option<OrientationChoice>,
         /// Optional parts of the answer. Default: none.
-        pub include: Option<Vec<GeometryInclude>>,
+        pub include: Option<Vec<GeometryAttribute>>,
     }
 }
 

@@ -2,7 +2,8 @@
 
 use super::common::{GeometryWork, geometry_request, plan_geometry};
 use crate::http::fields::{
-    Diagnostics, Fit, Flag, GeometryInclude, OrientationChoice, SurfaceModelChoice, SurfaceModelUsed, request,
+    Diagnostics, Fit, Flag, GeometryAttribute, OrientationChoice, SurfaceModelChoice, SurfaceModelUsed,
+    request,
 };
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
@@ -30,7 +31,7 @@ request! {
         /// The direction of normals. Default: `outward`.
         pub orientation: Option<OrientationChoice>,
         /// Optional parts of the answer. Default: none.
-        pub include: Option<Vec<GeometryInclude>>,
+        pub include: Option<Vec<GeometryAttribute>>,
         /// At most 192 points of the cloud, where `"solver": "local"` learns noise and shape of the surface.
         ///
         /// Default: 96 to 191 points that the solver chooses.

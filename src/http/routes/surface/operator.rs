@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use super::common::{asked_of, check_is_surface, geometry_request};
 use super::doubts::{DoubtfulAnswers, flags};
-use crate::http::fields::{Diagnostics, Fit, Flag, OrientationChoice, StencilsUsed, Surface, ValuesInclude};
+use crate::http::fields::{
+    Diagnostics, Fit, Flag, OrientationChoice, StencilCounts, Surface, ValueAttribute,
+};
 use crate::http::problem::Problem;
 use crate::http::serve::answers::surface::SurfaceGeometry;
 use crate::http::serve::fitted::Fits;
@@ -40,7 +42,7 @@ pub struct OperatorParts {
     pub surface: Option<Surface>,
     pub values: Vec<f64>,
     pub queries: Option<Points>,
-    pub include: Option<Vec<ValuesInclude>>,
+    pub include: Option<Vec<ValueAttribute>>,
 }
 
 /// A checked request for an operator as a matrix.
@@ -97,7 +99,7 @@ impl AppliedWork {
         applied: OperatorParts,
     ) -> Result<Plan<Self>, Problem> {
         let OperatorParts { surface: given, values, queries, include } = applied;
-        let has_deviations = include.is_some_and(|include| include.contains(&ValuesInclude::Std));
+        let has_deviations = include.is_some_and(|include| include.contains(&ValueAttribute::Std));
         let request = GeometryRequest { has_deviations, ..operator_request(&given) };
         let OperatorFits { mut main, values, mut surface } =
             planner.operator_fits(fit, GivenValues::one(values), given, &request)?;
@@ -370,7 +372,7 @@ impl StencilWork {
         };
         let found = found.map_err(|error| fits.surface().refused(error))?;
         surface.geometry.take_resolutions(&found.resolutions);
-        surface.stencils = Some(StencilsUsed::of(&found));
+        surface.stencils = Some(StencilCounts::of(&found));
         let SparseMatrix { indptr, indices, data, .. } = found.matrix;
         let (m, n, d) = (queries.n_points(), nodes.n_points(), queries.dimension());
         let (shape, of_data) = match operator {

@@ -4,7 +4,7 @@
 use super::operator::{
     AppliedAnswer, AppliedWork, MatrixAnswer, MatrixWork, OperatorParts, SparseAnswer, StencilWork,
 };
-use crate::http::fields::{Diagnostics, Fit, Flag, MeanChoice, Surface, ValuesInclude, request};
+use crate::http::fields::{Diagnostics, Fit, Flag, MeanChoice, Surface, ValueAttribute, request};
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
@@ -34,7 +34,7 @@ request! {
         /// The surface, if its fit differs from that of the values.
         pub surface: Option<Surface>,
         /// Optional parts of the answer. Default: none.
-        pub include: Option<Vec<ValuesInclude>>,
+        pub include: Option<Vec<ValueAttribute>>,
     }
 }
 

@@ -33,10 +33,10 @@ pub struct Region {
     pub upper: Vec<f64>,
 }
 
-/// What the edges between two regions say, or those within one.
+/// Weights of the edges between two regions, or within one, by whether normals agree across them.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Border {
+pub struct RegionAdjacency {
     /// The position of one of the two regions among those of the tile.
     pub first: usize,
     /// The position of the other one.
@@ -63,14 +63,14 @@ impl From<Region> for tiles::Region {
     }
 }
 
-impl From<tiles::Border> for Border {
+impl From<tiles::Border> for RegionAdjacency {
     fn from(tiles::Border { regions: [first, second], agreeing, opposing }: tiles::Border) -> Self {
         Self { first, second, agreeing, opposing }
     }
 }
 
-impl From<Border> for tiles::Border {
-    fn from(Border { first, second, agreeing, opposing }: Border) -> Self {
+impl From<RegionAdjacency> for tiles::Border {
+    fn from(RegionAdjacency { first, second, agreeing, opposing }: RegionAdjacency) -> Self {
         Self { regions: [first, second], agreeing, opposing }
     }
 }

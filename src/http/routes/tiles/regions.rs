@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::fields::{Border, Region};
+use super::fields::{Region, RegionAdjacency};
 use crate::http::fields::{Diagnostics, request};
 use crate::http::problem::Problem;
 use crate::http::problem::catalogue;
@@ -41,7 +41,7 @@ answer! {
         /// The regions.
         regions: Vec<Region>,
         /// The borders between regions, and the edges within each.
-        borders: Vec<Border>,
+        borders: Vec<RegionAdjacency>,
         /// The number of edges that the points would have on a surface that is sampled well.
         n_edges: usize,
         /// The numbers used, the method, its accuracy, and warnings.
@@ -98,7 +98,7 @@ impl Operation for RegionsRequest {
         Ok(RegionsResponse {
             labels: Integers::new(found.labels.into_iter().map(label).collect()),
             regions: found.tile.regions.into_iter().map(Region::from).collect(),
-            borders: found.tile.borders.into_iter().map(Border::from).collect(),
+            borders: found.tile.borders.into_iter().map(RegionAdjacency::from).collect(),
             n_edges: found.tile.n_edges,
             diagnostics: fitted.diagnostics(&Report::of_surface(surface), work.own.len()),
         })

@@ -8,7 +8,7 @@ use axum::response::Response;
 use serde::Deserialize;
 use utoipa::ToSchema;
 
-use super::fields::{Border, Region};
+use super::fields::{Region, RegionAdjacency};
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::{Pointers, Problem, from_numerics};
 use crate::http::state::app::App;
@@ -27,13 +27,13 @@ pub struct SidesRequest {
     /// The regions of each tile, as `POST /v1/tiles/regions` answers them.
     pub tiles: Vec<TileRegions>,
     /// Pairs of regions that have a point in common, counted on from one tile to the next.
-    pub links: Vec<Link>,
+    pub links: Vec<RegionOverlap>,
 }
 
 /// Two regions that have a point in common.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Link {
+pub struct RegionOverlap {
     /// The position of one of them among the regions of all tiles.
     pub first: usize,
     /// The position of the other one.
@@ -47,7 +47,7 @@ pub struct TileRegions {
     /// The regions.
     pub regions: Vec<Region>,
     /// Their borders.
-    pub borders: Vec<Border>,
+    pub borders: Vec<RegionAdjacency>,
     /// The number of edges that the points would have on a surface that is sampled well.
     pub n_edges: usize,
 }
@@ -117,7 +117,7 @@ impl From<TileRegions> for tiles::TileRegions {
     fn from(TileRegions { regions, borders, n_edges }: TileRegions) -> Self {
         Self {
             regions: regions.into_iter().map(Region::into).collect(),
-            borders: borders.into_iter().map(Border::into).collect(),
+            borders: borders.into_iter().map(RegionAdjacency::into).collect(),
             n_edges,
         }
     }

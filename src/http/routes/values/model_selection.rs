@@ -109,7 +109,7 @@ request! {
 
 /// The score at one alpha, with everything else as selected.
 #[derive(Debug, Clone, Copy, Serialize, ToSchema)]
-pub struct PathEntry {
+pub struct AlphaScore {
     /// The variance of the noise, α.
     pub alpha: f64,
     /// The score. Null where the matrix is not positive definite.
@@ -119,7 +119,7 @@ pub struct PathEntry {
 
 /// Predictions of each value from all others. A row that counts once with another has its prediction.
 #[derive(Debug, Clone, Serialize, ToSchema)]
-pub struct LeftOut {
+pub struct LeaveOneOutPredictions {
     /// The predictions, in the order of the points. Null where the mean is not determined without the point.
     #[schema(value_type = Vec<Option<f64>>)]
     pub means: Vec<Nullable>,
@@ -131,7 +131,7 @@ pub struct LeftOut {
     pub log_predictive_densities: Vec<Nullable>,
 }
 
-json_members!(LeftOut);
+json_members!(LeaveOneOutPredictions);
 
 /// The best score of a family.
 #[derive(Debug, Clone, Serialize, ToSchema)]
@@ -173,9 +173,9 @@ answer! {
         /// The score over ascending alpha, with everything else as selected.
         ///
         /// Empty with `noise_variances`, and for more than 3,000 points.
-        alpha_path: Vec<PathEntry>,
+        alpha_path: Vec<AlphaScore>,
         /// Predictions of each value from all others, in closed form.
-        leave_one_out: LeftOut,
+        leave_one_out: LeaveOneOutPredictions,
         /// Diagnostics of the fit that the search began with.
         diagnostics: Diagnostics,
     }

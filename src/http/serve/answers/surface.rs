@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::http::fields::{
-    Diagnostics, Flag, FlagReason, StencilsUsed, SurfaceModelUsed, Warning, WarningCode,
+    Diagnostics, Flag, FlagReason, StencilCounts, SurfaceModelUsed, Warning, WarningCode,
 };
 use crate::http::problem::Problem;
 use crate::http::serve::fitted::Fits;
@@ -24,7 +24,7 @@ pub struct SurfaceGeometry {
     pub surface: Arc<Surface>,
     pub geometry: Geometry,
     /// Rows of the sparse operator over the surface, once there is one.
-    pub stencils: Option<StencilsUsed>,
+    pub stencils: Option<StencilCounts>,
     request: GeometryRequest,
 }
 

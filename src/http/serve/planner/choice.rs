@@ -1,7 +1,7 @@
 //! Choice of kernel, regularization and solver in a request, and refusals of combinations that do not work.
 
 use super::inputs::length_mismatch;
-use crate::http::fields::{CloudRef, Fit, Hyperparameters, Kernel, SolverChoice, Surface};
+use crate::http::fields::{CloudInput, Fit, Hyperparameters, Kernel, SolverChoice, Surface};
 use crate::http::problem::{Pointers, Problem};
 use crate::http::problem::{catalogue, from_numerics};
 use crate::http::serve::plan::FittedCloud;
@@ -91,7 +91,7 @@ pub(super) fn checked_tolerance(fit: &Fit) -> Result<f64, Problem> {
 }
 
 /// Returns the pointers to the fit of a request.
-pub(super) fn pointers_of(cloud: &CloudRef, has_noise_variances: bool) -> Pointers {
+pub(super) fn pointers_of(cloud: &CloudInput, has_noise_variances: bool) -> Pointers {
     Pointers {
         points: if cloud.id.is_some() { "/cloud/id" } else { "/cloud/points" },
         regularization: if has_noise_variances { "/noise_variances" } else { "/alpha" },

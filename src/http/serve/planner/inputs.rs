@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 use std::sync::Arc;
 
 use super::Planner;
-use crate::http::fields::CloudRef;
+use crate::http::fields::CloudInput;
 use crate::http::fields::limits::{too_many_coordinates, too_many_points, too_many_queries, transposed};
 use crate::http::problem::{self, Problem, catalogue};
 use crate::http::serve::durable::TRUST;
@@ -89,7 +89,7 @@ impl Planner<'_> {
     ///
     /// # Errors
     /// 404 `unknown-cloud`, 413 beyond the limits, 422 for an invalid cloud.
-    pub fn cloud(&self, cloud: CloudRef, pointer: &str) -> Result<Arc<RegisteredCloud>, Problem> {
+    pub fn cloud(&self, cloud: CloudInput, pointer: &str) -> Result<Arc<RegisteredCloud>, Problem> {
         if let Some(registered) = cloud.registered {
             return Ok(registered);
         }

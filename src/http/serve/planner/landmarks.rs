@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::Planner;
 use super::choice::{FitOptions, pointers_of};
 use crate::http::fields::kernel::PlannedKernel;
-use crate::http::fields::{CloudRef, DuplicatePolicy, HasCloud, SolverChoice};
+use crate::http::fields::{CloudInput, DuplicatePolicy, HasCloud, SolverChoice};
 use crate::http::problem::{Problem, from_numerics};
 use crate::http::serve::plan::FittedCloud;
 use crate::store::clouds::RegisteredCloud;
@@ -113,7 +113,7 @@ impl Planner<'_> {
     /// also for a cloud that planning refuses.
     fn registered_if_large(
         &mut self,
-        cloud: &mut CloudRef,
+        cloud: &mut CloudInput,
         least: usize,
     ) -> Result<Option<Arc<RegisteredCloud>>, Problem> {
         let stored = match (&cloud.id, &cloud.points) {

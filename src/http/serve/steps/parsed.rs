@@ -2,7 +2,7 @@
 
 use super::planned::PlannedRequest;
 use super::{OnCall, Step};
-use crate::http::fields::CloudRef;
+use crate::http::fields::CloudInput;
 use crate::http::problem::Problem;
 use crate::http::serve::durable::{TRUST, find_cloud};
 use crate::http::serve::operation::AnyRequest;
@@ -95,7 +95,7 @@ impl ParsedRequest {
     }
 
     /// Number of points of a cloud of the request, 0 if the cloud is unknown.
-    fn n_points(&self, cloud: &CloudRef, on: &OnCall) -> usize {
+    fn n_points(&self, cloud: &CloudInput, on: &OnCall) -> usize {
         let id = cloud.id.as_deref().and_then(CloudId::parse);
         let of_id = |id| {
             let found = self.known.clouds.iter().find(|cloud| cloud.id == id).cloned();

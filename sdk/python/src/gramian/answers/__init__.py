@@ -5,7 +5,8 @@ of values. L is the unit of the coordinates and V the unit of the values.
 
 Arrays keep the order of the request. They are read-only views of the answer's bytes: `.copy()` them to change
 them. They have NaN where there is no meaningful number, and `flags` then says why. Answers can be
-pickled and used by several threads. `repr` shows arrays by their shapes.
+pickled and used by several threads. `print` shows a summary, `repr` arrays by their shapes. `save`, `to_pandas` and
+`to_pyvista` hand their numbers on, `plot` draws them.
 """
 
 from .answer import Answer
@@ -21,12 +22,13 @@ from .operators import (
 )
 from .selection import AlphaPath, LeaveOneOut, ModelSelection
 from .surface import Curvatures, Normals
-from .values import Interpolation, Posterior
+from .values import Data, Interpolation, Posterior
 
 __all__ = [
     "AlphaPath",
     "Answer",
     "Curvatures",
+    "Data",
     "Interpolation",
     "InterpolationBatch",
     "LaplaceBeltrami",

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from ..arguments.fit import ValuesFit
 from ..rest.models import Diagnostics
 from ..wire.tensors import Array
+from .asked import asked
 from .values import ValuesAnswer
 
 
@@ -41,19 +43,23 @@ class InterpolationBatch(ValuesAnswer):
     """
 
     values: Array
-    gradients: Array | None = None
-    hessians: Array | None = None
-    value_std: Array | None = None
-    gradient_std: Array | None = None
-    hessian_std: Array | None = None
+    gradients: Array = asked("derivatives=1")
+    hessians: Array = asked("derivatives=2")
+    value_std: Array = asked("std=True")
+    gradient_std: Array = asked("derivatives=1, std=True")
+    hessian_std: Array = asked("derivatives=2, std=True")
     mean_coefficients: Array | None = None
     diagnostics: Diagnostics
     fit: ValuesFit
 
+    SUMMARY: ClassVar = ("values", "gradients")
+
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class PosteriorBatch(ValuesAnswer):
-    """Gaussian processes given lists of values, at the queries. Quantities that were not requested are None.
+    """Gaussian processes given lists of values, at the queries.
+
+    Quantities other than the means are present if the request asks for them.
 
     Quantities that depend on the values have a row for each list. The lists share all others.
 
@@ -90,15 +96,17 @@ class PosteriorBatch(ValuesAnswer):
     """
 
     means: Array
-    variances: Array | None = None
-    observation_variances: Array | None = None
-    covariance: Array | None = None
-    gradients: Array | None = None
-    gradient_variances: Array | None = None
-    samples: Array | None = None
-    quantiles: Array | None = None
-    exceedance_probabilities: Array | None = None
-    log_marginal_likelihoods: Array | None = None
+    variances: Array = asked('include="variances"')
+    observation_variances: Array = asked('include="observation_variances"')
+    covariance: Array = asked('include="covariance"')
+    gradients: Array = asked('include="gradients"')
+    gradient_variances: Array = asked('include="gradient_variances"')
+    samples: Array = asked("samples=10")
+    quantiles: Array = asked("quantiles=[0.05, 0.95]")
+    exceedance_probabilities: Array = asked("threshold=0")
+    log_marginal_likelihoods: Array = asked('include="log_marginal_likelihood"')
     mean_coefficients: Array | None = None
     diagnostics: Diagnostics
     fit: ValuesFit
+
+    SUMMARY: ClassVar = ("means", "gradients")

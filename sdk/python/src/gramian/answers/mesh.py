@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-import os
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, Self
+from functools import partial
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from ..arguments.options import SurfaceFit
+from ..export import Table
+from ..export.table import AXES, NORMAL
 from ..rest.models import Diagnostics, MeshPart
 from ..wire.tensors import Array, Integers, Members
-from .answer import Answer, numbers_of
-from .files import replace_file
+from .answer import Answer
+from .asked import asked
 from .fit import surface_fit_used, values_fit_used
+from .summary import counted
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -23,11 +27,15 @@ SUPPORT = ("observed", "bridged", "extrapolated")
 """Support of a vertex, from most to least certain. Files have the position in this list."""
 
 
+SHOWN_PARTS = 3
+"""Number of parts in a summary, the largest ones."""
+
+
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Mesh(Answer):
     """A mesh of segments in the plane (d = 2) or triangles in space (d = 3).
 
-    It has k vertices and l cells. Curvatures and deviations are None unless requested.
+    It has k vertices and l cells. `include="curvatures"` and `std=True` ask for curvatures and deviations.
 
     Attributes
     ----------
@@ -72,17 +80,21 @@ class Mesh(Answer):
     normals: Array
     support: npt.NDArray[np.str_]
     residuals: Array
-    principal_curvatures: Array | None = None
-    mean_curvatures: Array | None = None
-    position_std: Array | None = None
-    normal_std: Array | None = None
-    principal_curvature_std: Array | None = None
-    mean_curvature_std: Array | None = None
+    principal_curvatures: Array = asked('include="curvatures"')
+    mean_curvatures: Array = asked('include="curvatures"')
+    position_std: Array = asked("std=True")
+    normal_std: Array = asked("std=True")
+    principal_curvature_std: Array = asked('include="curvatures", std=True')
+    mean_curvature_std: Array = asked('include="curvatures", std=True')
     parts: tuple[MeshPart, ...]
     dropped_parts: tuple[MeshPart, ...]
     closedness: float | None = None
     diagnostics: Diagnostics
     fit: SurfaceFit
+
+    ROWS: ClassVar = "k"
+    WORDS: ClassVar = {"support": SUPPORT}
+    SUMMARY: ClassVar = ("mean_curvatures", "residuals")
 
     @classmethod
     def read(cls, members: Members, **derived: object) -> Self:
@@ -90,6 +102,13 @@ class Mesh(Answer):
         fit = values_fit_used(members) if "values" in members.request else surface_fit_used(members)
         lists = {"cells": members.integers("cells"), "support": np.array(members["support"], dtype=np.str_)}
         return super().read(members, fit=fit, **lists, **derived)
+
+    def __str__(self) -> str:
+        parts = ", ".join(f"{part.n_cells:,} (χ = {part.euler_characteristic})" for part in self.parts[:SHOWN_PARTS])
+        more = f" and {len(self.parts) - SHOWN_PARTS} more" if len(self.parts) > SHOWN_PARTS else ""
+        head, *others = super().__str__().splitlines()
+        support = counted(iter(self.support.tolist()))
+        return "\n".join([head, f"parts by cells: {parts}{more}; vertices: {support}", *others])
 
     def to_trimesh(self) -> Trimesh:
         """Returns the triangles as a mesh of trimesh, with all that is known of the vertices as attributes.
@@ -112,27 +131,13 @@ class Mesh(Answer):
             self.vertices, self.cells, vertex_normals=self.normals, vertex_attributes=self._attributes(), process=False
         )
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the triangles to a file: `.ply` with all that is known of the vertices, `.glb` or `.obj`.
-
-        An older file is replaced once the new one is whole.
-
-        Raises
-        ------
-        ModuleNotFoundError, ValueError
-            As `to_trimesh`, and `ValueError` for another ending of the name.
-        """
-        name = os.fspath(path)
-        if not name.lower().endswith((".ply", ".glb", ".obj")):
-            raise ValueError(f"the name of a mesh ends with .ply, .glb or .obj, not as {name!r} does")
-        written = self.to_trimesh().export(file_type=name.lower().rpartition(".")[2])
-        replace_file(path, written.encode() if isinstance(written, str) else written)
-
     def plot(
         self,
         quantity: str | None = None,
         *,
         backend: Literal["matplotlib", "pyvista"] = "matplotlib",
+        length_unit: str = "L",
+        value_unit: str = "V",
         **looks: Any,  # noqa: ANN401 (of LevelSetDisplay.plot)
     ) -> Any:  # noqa: ANN401 (a LevelSetDisplay, or a Plotter of pyvista)
         """Draws the mesh, coloured by a quantity: the mean curvatures if there are any, or else the residuals.
@@ -140,29 +145,23 @@ class Mesh(Answer):
         The parameters are those of `Curvatures.plot`.
         """
         from ..plot import LevelSetDisplay
-        from ..plot.surfaces import shown_by_pyvista
 
-        if backend == "matplotlib":
-            return LevelSetDisplay.from_answer(self, quantity).plot(**looks)
-        return shown_by_pyvista(self.to_pyvista(), quantity)
+        units = (length_unit, value_unit)
+        if backend == "pyvista":
+            return self._turned(None, quantity, units)
+        return LevelSetDisplay.from_answer(self, quantity, units).plot(**looks)
 
-    def to_pyvista(self) -> Any:  # noqa: ANN401 (PolyData)
-        """Returns the mesh with the numbers of its vertices as a `pyvista.PolyData`."""
-        from ..plot.surfaces import to_pyvista
+    def _writers(self, table: Callable[[], Table]) -> dict[str, Callable[[], bytes]]:
+        """Returns the writers of tables, and those of trimesh for triangles alone."""
+        others = {ending: partial(self._exported, ending[1:]) for ending in (".glb", ".obj", ".stl")}
+        return {**super()._writers(table), **others}
 
-        numbers = {name: array for name, array in numbers_of(self, len(self.vertices)).items() if name != "vertices"}
-        return to_pyvista(self.vertices, self.cells, numbers | {"support": self._support_codes()})
+    def _exported(self, file_type: str) -> bytes:
+        written = self.to_trimesh().export(file_type=file_type)
+        return written.encode() if isinstance(written, str) else bytes(written)
 
     def _attributes(self) -> dict[str, Array]:
-        """Returns numbers of the vertices by their names in files: singular, with an index for components."""
-        numbers = numbers_of(self, len(self.vertices))
-        columns = {
-            f"{name.removesuffix('s')}_{at}" if array.ndim == 2 else name.removesuffix("s"): column
-            for name, array in numbers.items()
-            if name not in ("vertices", "normals")
-            for at, column in enumerate(array.reshape(len(array), -1).T)
-        }
-        return columns | {"support": self._support_codes()}
-
-    def _support_codes(self) -> Array:
-        return np.array([SUPPORT.index(word) for word in self.support], dtype=np.float64)
+        """Returns numbers of the vertices by their names in files."""
+        columns = self._table(None, None)
+        numbers = {name: column for name, column in columns.columns().items() if name not in (*AXES, *NORMAL)}
+        return {**numbers, **{name: codes.astype(np.float64) for name, codes in columns.codes().items()}}

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+import numpy.typing as npt
 
 from ..arguments.options import OperatorFit, SurfaceOperatorFit
+from ..export import Table
 from ..rest.models import Diagnostics, Flag
 from ..wire.tensors import Array, Members
 from .answer import Answer
+from .asked import asked
 from .fit import operator_fit_used
 from .sparse import csr_matrices
 
@@ -23,6 +30,63 @@ class OperatorAnswer(Answer):
     def read(cls, members: Members, **derived: object) -> Self:
         """Reads an answer and the options of its fit."""
         return super().read(members, fit=operator_fit_used(members), **derived)
+
+
+class MatrixAnswer(OperatorAnswer):
+    """The base class of matrices that turn values at the points into numbers at the queries."""
+
+    def plot(self, component: int = 0, ax: Any = None, *, length_unit: str = "L") -> Any:  # type: ignore[override]  # noqa: ANN401 (Axes, MatrixDisplay)
+        """Draws the entries of a matrix: as colours, or as dots where a sparse one has any.
+
+        Parameters
+        ----------
+        component : int, optional
+            The coordinate, for matrices of gradients. 0 if absent.
+        ax : matplotlib.axes.Axes, optional
+            Where to draw. New axes if absent.
+        length_unit : str, optional
+            Unit of lengths, such as `"mm"`. L if absent.
+        """
+        from ..plot import MatrixDisplay
+
+        matrices = self._matrices()
+        name = re.sub("(?<!^)(?=[A-Z])", " ", type(self).__name__)
+        shown = name if len(matrices) == 1 else f"{name}, component {component}"
+        member = "matrices" if hasattr(self, "matrices") else "matrix"
+        return MatrixDisplay(matrices[component], name=shown, unit=self.unit(member, length_unit)).plot(ax)
+
+    def __str__(self) -> str:
+        head, *others = super().__str__().splitlines()
+        m, n = self._matrices()[0].shape
+        stored = getattr(self._matrices()[0], "nnz", m * n) / m
+        member = "matrices" if hasattr(self, "matrices") else "matrix"
+        shape = f"{member}: {m:,} × {n:,}, {stored:.3g} entries a row, {self.unit(member)}"
+        return "\n".join([head, shape, *others])
+
+    def _matrices(self) -> Sequence[Any]:
+        """Returns the matrices, one for each component."""
+        return [self.matrix] if hasattr(self, "matrix") else self.matrices  # type: ignore[attr-defined]
+
+    def _writers(self, table: Callable[[], Table]) -> dict[str, Callable[[], bytes]]:
+        # A matrix has no row of numbers for a position, so it is saved whole.
+        return {".npz": super()._writers(table)[".npz"]}
+
+
+class SparseAnswer(MatrixAnswer):
+    """The base class of sparse matrices."""
+
+    def _arrays(self) -> dict[str, npt.NDArray[Any]]:
+        """Returns what `scipy.sparse.load_npz` reads: `data` has an axis for components if there are several."""
+        first, *others = self._matrices()
+        data = np.stack([matrix.data for matrix in (first, *others)])
+        return {
+            **super()._arrays(),
+            "format": np.array(b"csr"),
+            "shape": np.array(first.shape),
+            "indptr": first.indptr,
+            "indices": first.indices,
+            "data": data if others else data[0],
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -46,14 +110,16 @@ class SurfaceGradient(OperatorAnswer):
     """
 
     gradients: Array
-    gradient_std: Array | None = None
+    gradient_std: Array = asked("std=True")
     flags: tuple[Flag, ...]
     diagnostics: Diagnostics
     fit: OperatorFit
 
+    SUMMARY: ClassVar = ("gradients",)
+
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class SurfaceGradientMatrix(OperatorAnswer):
+class SurfaceGradientMatrix(MatrixAnswer):
     """The surface gradient as matrices, one per coordinate.
 
     Attributes
@@ -76,7 +142,7 @@ class SurfaceGradientMatrix(OperatorAnswer):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class SurfaceGradientSparseMatrix(OperatorAnswer):
+class SurfaceGradientSparseMatrix(SparseAnswer):
     """The surface gradient as sparse matrices, one per coordinate.
 
     Attributes
@@ -125,14 +191,16 @@ class LaplaceBeltrami(OperatorAnswer):
     """
 
     laplacians: Array
-    laplacian_std: Array | None = None
+    laplacian_std: Array = asked("std=True")
     flags: tuple[Flag, ...]
     diagnostics: Diagnostics
     fit: OperatorFit
 
+    SUMMARY: ClassVar = ("laplacians",)
+
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class LaplaceBeltramiMatrix(OperatorAnswer):
+class LaplaceBeltramiMatrix(MatrixAnswer):
     """The Laplace–Beltrami operator as a matrix: on the unit circle `matrix @ cos θ` is −cos θ.
 
     Attributes
@@ -155,7 +223,7 @@ class LaplaceBeltramiMatrix(OperatorAnswer):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class LaplaceBeltramiSparseMatrix(OperatorAnswer):
+class LaplaceBeltramiSparseMatrix(SparseAnswer):
     """The Laplace–Beltrami operator as a sparse matrix: on the unit circle `matrix @ cos θ` is −cos θ.
 
     Attributes

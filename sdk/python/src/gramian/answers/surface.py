@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, Self
+from typing import ClassVar, Self
 
 from ..arguments.options import SurfaceFit
 from ..rest.models import Diagnostics, Flag, SurfaceModelUsed
 from ..wire.tensors import Array, Members
-from .answer import Answer, numbers_of
+from .answer import Answer
+from .asked import asked
 from .fit import surface_fit_used
 
 
@@ -20,53 +21,12 @@ class SurfaceAnswer(Answer):
         """Reads an answer and the options of its fit."""
         return super().read(members, fit=surface_fit_used(members), **derived)
 
-    def plot(
-        self,
-        quantity: str | None = None,
-        *,
-        positions: Array | None = None,
-        backend: Literal["matplotlib", "pyvista"] = "matplotlib",
-        **looks: Any,  # noqa: ANN401 (of SurfaceDisplay.plot)
-    ) -> Any:  # noqa: ANN401 (a SurfaceDisplay, or a Plotter of pyvista)
-        """Draws the points, coloured by a quantity: the mean curvatures, or else the norms of gradients.
-
-        Parameters
-        ----------
-        quantity : str, optional
-            Name of a member, such as `"gaussian_curvatures"`.
-        positions : array_like, `[m, d]`, optional
-            The queries, if the client has no copy of them.
-        backend : str, optional
-            `"pyvista"` for a picture that can be turned (extra `pyvista`). `"matplotlib"` if absent.
-        **looks
-            Options of `gramian.plot.SurfaceDisplay.plot`.
-
-        Returns
-        -------
-        SurfaceDisplay or pyvista.Plotter
-            With pyvista, `show()` shows it.
-        """
-        from ..plot import SurfaceDisplay
-        from ..plot.surfaces import shown_by_pyvista
-
-        display = SurfaceDisplay.from_answer(self, quantity, positions)
-        if backend == "matplotlib":
-            return display.plot(**looks)
-        return shown_by_pyvista(self.to_pyvista(positions), quantity)
-
-    def to_pyvista(self, positions: Array | None = None) -> Any:  # noqa: ANN401 (PolyData)
-        """Returns the points with the numbers of the answer as a `pyvista.PolyData`."""
-        from ..plot.surfaces import to_pyvista
-
-        places = self.positions if positions is None else positions
-        if places is None:
-            raise ValueError("the positions are not known: give them, as to_pyvista(points)")
-        return to_pyvista(places, None, numbers_of(self, len(places)))
+    WORDS: ClassVar = {"surface_models": tuple(model.value for model in SurfaceModelUsed)}
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Normals(SurfaceAnswer):
-    """Unit normals of the surface at the queries. Deviations are None unless requested.
+    """Unit normals of the surface at the queries. `std=True` asks for deviations.
 
     Attributes
     ----------
@@ -82,7 +42,8 @@ class Normals(SurfaceAnswer):
         `[m]`, radians. Standard deviation σ of the angle of the normal: 95 % of the angles are below 1.96 σ.
         NaN where it is unknown.
     edge_normals
-        `[m, 2, d]`. Normals of the two sheets at queries on a sharp edge, NaN elsewhere. None unless requested.
+        `[m, 2, d]`. Normals of the two sheets at queries on a sharp edge, NaN elsewhere, with
+        `include="edge_normals"`.
     flags
         The queries without a normal, or with a doubtful one.
     diagnostics
@@ -95,18 +56,20 @@ class Normals(SurfaceAnswer):
     gradient_norms: Array
     levels: Array
     surface_models: tuple[SurfaceModelUsed, ...]
-    normal_std: Array | None = None
-    edge_normals: Array | None = None
+    normal_std: Array = asked("std=True")
+    edge_normals: Array = asked('include="edge_normals"')
     flags: tuple[Flag, ...]
     diagnostics: Diagnostics
     fit: SurfaceFit
+
+    SUMMARY: ClassVar = ("normal_std", "levels")
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Curvatures(SurfaceAnswer):
     """Curvatures of the surface at the queries.
 
-    With outward normals, a sphere of radius r has +1/r everywhere. Deviations are None unless requested.
+    With outward normals, a sphere of radius r has +1/r everywhere. `std=True` asks for deviations.
 
     Attributes
     ----------
@@ -137,7 +100,8 @@ class Curvatures(SurfaceAnswer):
     gaussian_curvature_std
         `[m]`, 1/L^(d − 1). Standard deviations of the Gaussian curvatures.
     edge_normals
-        `[m, 2, d]`. Normals of the two sheets at queries on a sharp edge, NaN elsewhere. None unless requested.
+        `[m, 2, d]`. Normals of the two sheets at queries on a sharp edge, NaN elsewhere, with
+        `include="edge_normals"`.
     flags
         The queries without curvatures, or with doubtful ones.
     diagnostics
@@ -154,11 +118,13 @@ class Curvatures(SurfaceAnswer):
     gradient_norms: Array
     levels: Array
     surface_models: tuple[SurfaceModelUsed, ...]
-    normal_std: Array | None = None
-    principal_curvature_std: Array | None = None
-    mean_curvature_std: Array | None = None
-    gaussian_curvature_std: Array | None = None
-    edge_normals: Array | None = None
+    normal_std: Array = asked("std=True")
+    principal_curvature_std: Array = asked("std=True")
+    mean_curvature_std: Array = asked("std=True")
+    gaussian_curvature_std: Array = asked("std=True")
+    edge_normals: Array = asked('include="edge_normals"')
     flags: tuple[Flag, ...]
     diagnostics: Diagnostics
     fit: SurfaceFit
+
+    SUMMARY: ClassVar = ("mean_curvatures", "gaussian_curvatures")

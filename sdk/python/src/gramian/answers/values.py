@@ -3,22 +3,62 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
+from ..arguments.describe import described
 from ..arguments.fit import ValuesFit
 from ..rest.models import Diagnostics
 from ..wire.tensors import Array, Members
 from .answer import Answer
+from .asked import asked
 from .fit import values_fit_used
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Data:
+    """What a function was fitted to.
+
+    Attributes
+    ----------
+    points
+        `[n, d]`, L. The points of the cloud.
+    values
+        `[n]`, or `[k, n]` for several lists, V. The values at the points.
+    """
+
+    points: Array
+    values: Array
+
+    def __repr__(self) -> str:
+        return described("Data", vars(self))
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ValuesAnswer(Answer):
-    """The base class of answers about functions through values."""
+    """The base class of answers about functions through values.
+
+    Attributes
+    ----------
+    data
+        The points and the values, which pictures show. None if the client has no copy of the points.
+    """
+
+    data: Data | None = None
 
     @classmethod
     def read(cls, members: Members, **derived: object) -> Self:
-        """Reads an answer and the options of its fit."""
-        return super().read(members, fit=values_fit_used(members), **derived)
+        """Reads an answer, the options of its fit and its data."""
+        data = data_of(members, derived.get("points"))
+        return super().read(members, fit=values_fit_used(members), data=data, **derived)
+
+
+def data_of(members: Members, points: Any) -> Data | None:  # noqa: ANN401 (Array or None)
+    """Returns the data of a request about a cloud with these points."""
+    if points is None or "values" not in members.request:
+        return None
+    values = members.request["values"].view()
+    values.flags.writeable = False
+    return Data(points, values)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -33,9 +73,12 @@ class Interpolation(ValuesAnswer):
         `[m, d]`, V/L. ∇u, with `derivatives` of 1 or 2.
     hessians
         `[m, d, d]`, V/L². D²u, with `derivatives` of 2.
-    value_std, gradient_std, hessian_std
-        Standard deviations of `values`, `gradients` and `hessians` given the data, of the same shapes, with
-        `std`.
+    value_std
+        `[m]`, V, with `std`. Standard deviations of `values` given the data.
+    gradient_std
+        `[m, d]`, V/L, with `std`. Standard deviations of the components of ∇u.
+    hessian_std
+        `[m, d, d]`, V/L², with `std`. Standard deviations of the entries of D²u.
     diagnostics
         The kernel and α used, how the system was solved, and how well.
     fit
@@ -43,18 +86,22 @@ class Interpolation(ValuesAnswer):
     """
 
     values: Array
-    gradients: Array | None = None
-    hessians: Array | None = None
-    value_std: Array | None = None
-    gradient_std: Array | None = None
-    hessian_std: Array | None = None
+    gradients: Array = asked("derivatives=1")
+    hessians: Array = asked("derivatives=2")
+    value_std: Array = asked("std=True")
+    gradient_std: Array = asked("derivatives=1, std=True")
+    hessian_std: Array = asked("derivatives=2, std=True")
     diagnostics: Diagnostics
     fit: ValuesFit
+
+    SUMMARY: ClassVar = ("values", "gradients")
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Posterior(ValuesAnswer):
-    """A Gaussian process given the values, at the queries. Quantities that were not requested are None.
+    """A Gaussian process given the values, at the queries.
+
+    Quantities other than the means are present if the request asks for them.
 
     Attributes
     ----------
@@ -85,30 +132,16 @@ class Posterior(ValuesAnswer):
     """
 
     means: Array
-    variances: Array | None = None
-    observation_variances: Array | None = None
-    covariance: Array | None = None
-    gradients: Array | None = None
-    gradient_variances: Array | None = None
-    samples: Array | None = None
-    quantiles: Array | None = None
-    exceedance_probabilities: Array | None = None
-    log_marginal_likelihood: float | None = None
+    variances: Array = asked('include="variances"')
+    observation_variances: Array = asked('include="observation_variances"')
+    covariance: Array = asked('include="covariance"')
+    gradients: Array = asked('include="gradients"')
+    gradient_variances: Array = asked('include="gradient_variances"')
+    samples: Array = asked("samples=10")
+    quantiles: Array = asked("quantiles=[0.05, 0.95]")
+    exceedance_probabilities: Array = asked("threshold=0")
+    log_marginal_likelihood: float = asked('include="log_marginal_likelihood"')
     diagnostics: Diagnostics
     fit: ValuesFit
 
-    def plot(self, places: Array | None = None, ax: Any = None, **looks: Any) -> Any:  # noqa: ANN401 (PosteriorDisplay)
-        """Draws the mean along a line, with a band in which the function is with 95 % if there are variances.
-
-        Parameters
-        ----------
-        places : array_like, `[m]`, optional
-            Where the queries are along the line. By the way from the first to each, if absent.
-        ax : matplotlib.axes.Axes, optional
-            Where to draw. New axes if absent.
-        **looks
-            Options of `gramian.plot.PosteriorDisplay.plot`.
-        """
-        from ..plot import PosteriorDisplay
-
-        return PosteriorDisplay.from_answer(self, places).plot(ax, **looks)
+    SUMMARY: ClassVar = ("means", "gradients")

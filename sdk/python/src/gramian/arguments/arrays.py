@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..wire.tensors import Array
+from .geometries import positions_of
 
 Sizes: TypeAlias = Mapping[str, int]
 """Known lengths of axes, by name: n points, d coordinates."""
@@ -51,7 +52,7 @@ def as_array(name: str, value: object, axes: Sequence[str], sizes: Sizes) -> Arr
     name
         Name of the argument, for messages.
     value
-        Lists, tuples, buffers, arrays, and anything from which NumPy makes an array, such as data frames.
+        Lists, tuples, buffers, arrays, anything from which NumPy makes an array, such as data frames, and geometries.
     axes
         The names of the axes: `["n"]`, `["n", "d"]`.
     sizes
@@ -79,6 +80,7 @@ def as_block(name: str, value: object, first: int) -> Array:
 
 def read(name: str, value: object, first: int = 0) -> AnyArray:
     """Returns the array that NumPy reads. Refuses entries that are masked or no real numbers."""
+    value = positions_of(value)
     if isinstance(value, Mapping | Set | Iterator):
         raise TypeError(f"{name} is to be an array, not a {type(value).__name__}; list(…) makes one of its entries")
     array = _refuse_masked(name, value, first)

@@ -12,21 +12,21 @@ from ..rest import models
 from ..rest.models import (
     Diagnostics,
     DuplicatePolicy,
-    GeometryInclude,
+    GeometryAttribute,
     KernelDescription,
     KernelFamily,
     KernelUsed,
     MeanChoice,
-    MeshInclude,
+    MeshAttribute,
     MeshQuality,
     OrientationChoice,
-    PosteriorOf,
     PosteriorQuantity,
+    PosteriorTarget,
     SolverChoice,
     SolverUsed,
     SurfaceModelChoice,
     SurfaceModelUsed,
-    ValuesInclude,
+    ValueAttribute,
 )
 from ..rest.types import Unset
 from .describe import described
@@ -50,9 +50,9 @@ Family: TypeAlias = KernelFamily | Literal["gauss", "laplace", "matern", "wendla
 Solver: TypeAlias = SolverChoice | SolverUsed | Literal["auto", "dense", "landmark", "iterative", "local"]
 Duplicates: TypeAlias = DuplicatePolicy | Literal["refuse", "merge"]
 SurfaceModel: TypeAlias = SurfaceModelChoice | SurfaceModelUsed | Literal["auto", "signature", "offset", "regression"]
-Std: TypeAlias = ValuesInclude | Literal["std"]
-GeometryWord: TypeAlias = GeometryInclude | Literal["std", "edge_normals"]
-MeshWord: TypeAlias = MeshInclude | Literal["curvatures", "std"]
+Std: TypeAlias = ValueAttribute | Literal["std"]
+GeometryWord: TypeAlias = GeometryAttribute | Literal["std", "edge_normals"]
+MeshWord: TypeAlias = MeshAttribute | Literal["curvatures", "std"]
 Quality: TypeAlias = MeshQuality | Literal["regular", "raw"]
 Mean: TypeAlias = MeanChoice | Literal["zero", "constant", "linear"]
 Orientation: TypeAlias = OrientationChoice | Literal["outward", "gradient"]
@@ -67,7 +67,7 @@ Quantity: TypeAlias = (
         "log_marginal_likelihood",
     ]
 )
-Of: TypeAlias = PosteriorOf | Literal["function", "observation"]
+Of: TypeAlias = PosteriorTarget | Literal["function", "observation"]
 
 
 class KernelParameters(TypedDict, total=False):

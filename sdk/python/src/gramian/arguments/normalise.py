@@ -29,15 +29,15 @@ from ..rest.models import (
     Diagnostics,
     DuplicatePolicy,
     FreeParameter,
-    GeometryInclude,
+    GeometryAttribute,
     KernelDescription,
     KernelFamily,
     MeanChoice,
-    MeshInclude,
+    MeshAttribute,
     MeshQuality,
     OrientationChoice,
-    PosteriorOf,
     PosteriorQuantity,
+    PosteriorTarget,
     SelectionCriterion,
     SelectionParameter,
     SolverChoice,
@@ -133,8 +133,8 @@ def with_std(fields: Mapping[str, object]) -> dict[str, object]:
     std, include = fields.get("std"), fields.get("include")
     if _is_absent(std) or not as_truth("std", std):
         return others
-    wanted = [] if _is_absent(include) else as_words("include", include, MeshInclude)
-    return {**others, "include": list(dict.fromkeys([*wanted, MeshInclude.STD.value]))}
+    wanted = [] if _is_absent(include) else as_words("include", include, MeshAttribute)
+    return {**others, "include": list(dict.fromkeys([*wanted, MeshAttribute.STD.value]))}
 
 
 def samples(name: str, value: object, sizes: Sizes) -> dict[str, object]:
@@ -294,7 +294,7 @@ REQUEST: Mapping[str, Rule] = {
     "samples": samples,
     "quantiles": array("quantiles"),
     "threshold": number,
-    "of": word(*PosteriorOf),
+    "of": word(*PosteriorTarget),
     "surface_model": word(*SurfaceModelChoice),
     "orientation": word(*OrientationChoice),
     "surface": surface,
@@ -305,12 +305,12 @@ REQUEST: Mapping[str, Rule] = {
     "seed": whole,
 }
 
-GEOMETRIC: Mapping[str, Rule] = {**REQUEST, "include": words(*GeometryInclude)}
+GEOMETRIC: Mapping[str, Rule] = {**REQUEST, "include": words(*GeometryAttribute)}
 """Rules for normals and curvatures, and for values and operators that may have deviations."""
 
 MESH: Mapping[str, Rule] = {
     **REQUEST,
-    "include": words(*MeshInclude),
+    "include": words(*MeshAttribute),
     "level": number,
     "step": number,
     "bounds": box,

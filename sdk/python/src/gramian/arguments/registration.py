@@ -85,7 +85,9 @@ class RegisteredCloud:
         """
         sizes = {"n": self.n_points, "d": self.dimension}
         request = {"cloud": {"id": self.id}, **normalise(with_std(fields), rules, sizes)}
-        placed = partial(read, positions=_read_only(request.get("queries", self._points)))
+        # Without queries an operator answers at the points of its surface.
+        at = _cloud_of(fields.get("surface")) or self
+        placed = partial(read, positions=_read_only(request.get("queries", at._points)), points=self._points)
         try:
             return self._connection.compute(path, request, placed, self.id)
         except UnknownCloud:

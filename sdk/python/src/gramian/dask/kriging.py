@@ -123,6 +123,6 @@ class Kriging:
         answer = replicas.ask(number, call)
         rows: Rows = {name: array for name, array in vars(answer).items() if isinstance(array, np.ndarray)}
         rows["values"] = answer.values + law.mean_at(queries.points)
-        if answer.gradients is not None and len(law.mean) > 1:
+        if hasattr(answer, "gradients") and len(law.mean) > 1:
             rows["gradients"] = answer.gradients + law.mean[1:]
         return rows | {"index": queries.index}

@@ -14,6 +14,7 @@ was drawn.
 """
 
 from .lines import LikelihoodDisplay, PosteriorDisplay
+from .matrices import MatrixDisplay
 from .surfaces import LevelSetDisplay, SurfaceDisplay
 
-__all__ = ["LevelSetDisplay", "LikelihoodDisplay", "PosteriorDisplay", "SurfaceDisplay"]
+__all__ = ["LevelSetDisplay", "LikelihoodDisplay", "MatrixDisplay", "PosteriorDisplay", "SurfaceDisplay"]

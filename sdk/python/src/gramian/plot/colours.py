@@ -34,9 +34,12 @@ def mappable_of(limits: tuple[float, float], cmap: str) -> Any:  # noqa: ANN401 
 def colours_of(mappable: Any, values: Array, std: Array | None) -> Array:  # noqa: ANN401
     """Returns colours `[m, 3]`. They are grey where the deviation is half the range of colours, in four steps."""
     rgb: Array = mappable.to_rgba(values)[:, :3]
-    if std is None:
-        return rgb
-    share = np.nan_to_num(std / (0.5 * (mappable.norm.vmax - mappable.norm.vmin)), nan=1.0)
+    return rgb if std is None else faded(rgb, std, (mappable.norm.vmin, mappable.norm.vmax))
+
+
+def faded(rgb: Array, std: Array, limits: tuple[float, float]) -> Array:
+    """Returns colours `[m, 3]` that are grey where the deviation is half the range of colours, in four steps."""
+    share = np.nan_to_num(std / (0.5 * (limits[1] - limits[0])), nan=1.0)
     step = np.minimum(np.floor(np.clip(share, 0, 1) * STEPS), STEPS - 1) / (STEPS - 1)
     greyed: Array = rgb + (0.92 * step)[:, None] * (GREY - rgb)
     return greyed

@@ -6,17 +6,15 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..wire.tensors import Array, Integers
+from ..wire.tensors import Array
+from .axes import axes_of, draw_directions, labelled, name_plane
 from .colours import colours_of, limits_of, mappable_of
 from .needed import needed
+from .quantities import default_quantity, is_signed, scalars_of, std_of
 from .splats import camera, shaded, splatted
 
 WIDTH = 900
 """Pixels of the longer side of a picture of points in space."""
-
-
-QUANTITIES = ("mean_curvatures", "residuals", "gradient_norms")
-"""What is shown if nothing is named, the first that there is."""
 
 
 class SurfaceDisplay:
@@ -36,6 +34,10 @@ class SurfaceDisplay:
         Title of the picture, such as `"mean curvatures"`.
     is_signed
         True for a range of colours that is symmetric about 0.
+    units
+        Units of the positions and of the values.
+    data
+        Positions `[n, 2]` and values `[n]` of the data, which are drawn in the plane.
     """
 
     def __init__(
@@ -47,6 +49,8 @@ class SurfaceDisplay:
         normals: Array | None = None,
         name: str = "",
         is_signed: bool = False,
+        units: tuple[str, str] = ("L", ""),
+        data: tuple[Array, Array] | None = None,
     ) -> None:
         self.positions = np.asarray(positions, dtype=np.float64)
         self.values = np.asarray(values, dtype=np.float64)
@@ -54,18 +58,23 @@ class SurfaceDisplay:
         self.normals = normals
         self.name = name
         self.is_signed = is_signed
+        self.units = units
+        self.data = data
 
     @classmethod
     def from_answer(
         cls,
-        answer: Any,  # noqa: ANN401 (Curvatures or Normals)
+        answer: Any,  # noqa: ANN401 (an Answer)
         quantity: str | None = None,
         positions: Array | None = None,
+        units: tuple[str, str] = ("L", "V"),
     ) -> Self:
-        """Takes a quantity of curvatures or normals: the mean curvatures, or the first that there is.
+        """Takes a quantity of an answer with a number for each position: the mean curvatures, or the first there is.
 
         Raises
         ------
+        AttributeError
+            If the quantity was not asked for.
         ValueError
             If the positions are not known, because the client has no copy of the points, or if the answer lacks
             the quantity.
@@ -73,19 +82,17 @@ class SurfaceDisplay:
         places = answer.positions if positions is None else positions
         if places is None:
             raise ValueError("the positions are not known: give them, as plot(positions=points)")
-        name = quantity or default_quantity(answer)
-        values = getattr(answer, name, None)
-        if values is None:
-            raise ValueError(f"the answer has no {name}")
-        if values.ndim == 2:
-            values = values[:, 0]
+        name = quantity or default_quantity(answer) or ""
+        given = getattr(answer, "data", None) if name in ("values", "means") else None
         return cls(
             places,
-            values,
+            scalars_of(answer, name),
             std=std_of(answer, name),
-            normals=answer.normals,
+            normals=getattr(answer, "normals", None),
             name=name.replace("_", " "),
-            is_signed=name.endswith("curvatures"),
+            is_signed=is_signed(name),
+            units=(units[0], answer.unit(name, *units)),
+            data=None if given is None or given.values.ndim > 1 else (given.points, given.values),
         )
 
     def plot(
@@ -116,7 +123,7 @@ class SurfaceDisplay:
         suppress : bool, optional
             False to show colours however uncertain they are.
         """
-        axes = _axes(ax)
+        axes = axes_of(ax)
         self.mappable_ = mappable_of(
             limits or limits_of(self.values, is_signed=self.is_signed),
             cmap or ("RdYlBu_r" if self.is_signed else "viridis"),
@@ -127,7 +134,7 @@ class SurfaceDisplay:
         else:
             view = camera(elevation, azimuth)
             self._draw_in_space(axes, view, shaded(colours, self.normals, view), size)
-        _finish(axes, self.name, self.mappable_)
+        _finish(axes, self.name, self.mappable_, _bar(self.units[1], self.std if suppress else None))
         self.axes_, self.figure_ = axes, axes.figure
         return self
 
@@ -135,6 +142,11 @@ class SurfaceDisplay:
         is_known = np.isfinite(self.values)
         axes.scatter(*self.positions[is_known].T, c=colours[is_known], s=14)
         axes.scatter(*self.positions[~is_known].T, facecolors="none", edgecolors="magenta", s=30)
+        if self.data is not None:
+            places, values = self.data
+            colours = self.mappable_.to_rgba(values)
+            axes.scatter(*places.T, c=colours, s=14, edgecolors="black", linewidths=0.6, label="data")
+        name_plane(axes, self.units[0])
 
     def _draw_in_space(self, axes: Any, view: Array, colours: Array, size: float | None) -> None:  # noqa: ANN401
         is_known = np.isfinite(self.values)
@@ -145,6 +157,9 @@ class SurfaceDisplay:
             image, box = splatted(places[is_known], colours[is_known], radius, WIDTH)
             axes.imshow(image, extent=box, origin="lower", interpolation="antialiased")
         axes.scatter(*places[~is_known, :2].T, facecolors="none", edgecolors="magenta", s=20, linewidths=0.6)
+        low, high = places[:, :2].min(axis=0), places[:, :2].max(axis=0)
+        draw_directions(axes, view, (low[0], high[0], low[1], high[1]), self.units[0])
+        axes.set_axis_off()
 
 
 class LevelSetDisplay:
@@ -160,6 +175,8 @@ class LevelSetDisplay:
         `[k]`. Standard deviations of the values.
     name
         Title of the picture.
+    units
+        Units of the vertices and of the values.
     """
 
     def __init__(
@@ -169,22 +186,30 @@ class LevelSetDisplay:
         *,
         std: Array | None = None,
         name: str = "",
+        units: tuple[str, str] = ("L", ""),
     ) -> None:
         self.mesh = mesh
         self.values = values
         self.std = std
         self.name = name
+        self.units = units
 
     @classmethod
-    def from_answer(cls, answer: Any, quantity: str | None = None) -> Self:  # noqa: ANN401 (Mesh)
+    def from_answer(
+        cls,
+        answer: Any,  # noqa: ANN401 (Mesh)
+        quantity: str | None = None,
+        units: tuple[str, str] = ("L", "V"),
+    ) -> Self:
         """Takes a quantity of a mesh: the mean curvatures, or else the residuals."""
-        name = quantity or default_quantity(answer)
-        values = getattr(answer, name, None)
-        if values is None:
-            raise ValueError(f"the answer has no {name}")
-        if values.ndim == 2:
-            values = values[:, 0]
-        return cls(answer, values, std=std_of(answer, name), name=name.replace("_", " "))
+        name = quantity or default_quantity(answer) or ""
+        return cls(
+            answer,
+            scalars_of(answer, name),
+            std=std_of(answer, name),
+            name=name.replace("_", " "),
+            units=(units[0], answer.unit(name, *units)),
+        )
 
     def plot(
         self,
@@ -196,75 +221,46 @@ class LevelSetDisplay:
         limits: tuple[float, float] | None = None,
     ) -> Self:
         """Draws the mesh. The looks are those of `SurfaceDisplay.plot`."""
-        axes = _axes(ax)
-        is_signed = self.name.endswith("curvatures")
-        known = limits or limits_of(self.values, is_signed=is_signed)
-        self.mappable_ = mappable_of(known, cmap or ("RdYlBu_r" if is_signed else "viridis"))
+        axes = axes_of(ax)
+        signed = is_signed(self.name)
+        known = limits or limits_of(self.values, is_signed=signed)
+        self.mappable_ = mappable_of(known, cmap or ("RdYlBu_r" if signed else "viridis"))
         colours = colours_of(self.mappable_, self.values, self.std)
         cells = self.mesh.cells
         if cells.shape[1] == 2:
             _draw_segments(axes, self.mesh.vertices[cells], colours[cells].mean(axis=1))
+            axes.autoscale()
+            name_plane(axes, self.units[0])
         else:
             view = camera(elevation, azimuth)
-            colours = shaded(colours, self.mesh.normals, view)
-            _draw_triangles(axes, (self.mesh.vertices @ view.T)[cells], colours[cells].mean(axis=1))
-        axes.autoscale()
-        _finish(axes, self.name, self.mappable_)
+            colours, places = shaded(colours, self.mesh.normals, view), self.mesh.vertices @ view.T
+            _draw_triangles(axes, places[cells], colours[cells].mean(axis=1))
+            axes.autoscale()
+            draw_directions(axes, view, (*axes.get_xlim(), *axes.get_ylim()), self.units[0])
+            axes.set_axis_off()
+        _finish(axes, self.name, self.mappable_, _bar(self.units[1], self.std))
         self.axes_, self.figure_ = axes, axes.figure
         return self
 
 
-def default_quantity(answer: object) -> str:
-    """Returns the quantity that is shown if none is named."""
-    return next(name for name in QUANTITIES if getattr(answer, name, None) is not None)
-
-
-def std_of(answer: object, quantity: str) -> Array | None:
-    """Returns the standard deviations of a quantity, if the answer has them."""
-    found: Array | None = getattr(answer, f"{quantity.removesuffix('s')}_std", None)
-    return found if found is None or found.ndim == 1 else found[:, 0]
-
-
-def to_pyvista(positions: Array, cells: Integers | None, attributes: dict[str, Array]) -> Any:  # noqa: ANN401 (PolyData)
-    """Returns points or triangles of pyvista, with attributes of the points.
-
-    Raises
-    ------
-    ModuleNotFoundError
-        If pyvista is not installed.
-    """
-    pyvista = needed("pyvista", "pyvista")
-    positions = np.asarray(positions, dtype=np.float64)
-    places = np.column_stack([positions, np.zeros((len(positions), 3 - positions.shape[1]))])
-    made = pyvista.PolyData(places)
-    if cells is not None:
-        padded = np.column_stack([np.full(len(cells), cells.shape[1]), cells]).ravel()
-        made = pyvista.PolyData(places, padded) if cells.shape[1] == 3 else pyvista.PolyData(places, lines=padded)
-    for name, array in attributes.items():
-        made.point_data[name] = array
-    return made
-
-
-def shown_by_pyvista(data: Any, quantity: str | None) -> Any:  # noqa: ANN401 (PolyData, Plotter)
+def shown_by_pyvista(data: Any, quantity: str, unit: str) -> Any:  # noqa: ANN401 (PolyData, Plotter)
     """Returns a plotter of pyvista with the points or triangles, coloured by a quantity."""
-    if quantity is not None and quantity not in data.point_data:
-        raise ValueError(f"the answer has no {quantity}")
     plotter = needed("pyvista", "pyvista").Plotter()
-    names = [quantity] if quantity else [*QUANTITIES, *data.point_data.keys()]
-    scalars = next(name for name in names if name in data.point_data)
-    plotter.add_mesh(data, scalars=scalars, render_points_as_spheres=True, point_size=8)
+    bar = {"title": labelled(quantity.replace("_", " "), unit)}
+    plotter.add_mesh(data, scalars=quantity, render_points_as_spheres=True, point_size=8, scalar_bar_args=bar)
+    plotter.add_axes()
     return plotter
 
 
-def _axes(ax: Any) -> Any:  # noqa: ANN401
-    return needed("matplotlib.pyplot", "plot").subplots()[1] if ax is None else ax
+def _bar(unit: str, std: Array | None) -> str:
+    """Returns the label of the bar of colours."""
+    return f"{unit} (grey where uncertain)".strip() if std is not None else unit
 
 
-def _finish(axes: Any, name: str, mappable: Any) -> None:  # noqa: ANN401
+def _finish(axes: Any, name: str, mappable: Any, label: str) -> None:  # noqa: ANN401
     axes.set_aspect("equal")
-    axes.set_axis_off()
     axes.set_title(name)
-    axes.figure.colorbar(mappable, ax=axes, shrink=0.7, extend="both")
+    axes.figure.colorbar(mappable, ax=axes, shrink=0.7, extend="both", label=label)
 
 
 def _draw_segments(axes: Any, ends: Array, colours: Array) -> None:  # noqa: ANN401

@@ -59,6 +59,9 @@ def script_folders(package: Path) -> list[Path]:
         Path(sysconfig.get_path("scripts", vars={"base": sys.base_prefix})),
         Path(sysconfig.get_path("scripts", scheme=sysconfig.get_preferred_scheme("user"))),
     ]
+    clone = package.parents[3]
+    if (clone / "Cargo.toml").is_file():  # the package of a clone, as it stands: what cargo has built there
+        folders = [clone / "target/release", clone / "target/debug", *folders]
     return list(dict.fromkeys(folders))
 
 
@@ -78,6 +81,6 @@ def kind_of_installation(package: Path) -> str:
 
 WAYS_ON = (
     f"On Linux and macOS install the wheel with the program: pip install --force-reinstall {NAME}. Or build the "
-    "program (cargo build --release), and set GRAMIAN_BINARY to its path. Or use a service elsewhere, by "
-    "gramian.Client(url) or GRAMIAN_URL."
+    "program (cargo build --release): the package of that clone finds it, and others by its path in GRAMIAN_BINARY. Or "
+    "use a service elsewhere, by gramian.Client(url) or GRAMIAN_URL."
 )

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy.typing as npt
 
+from ..arguments.geometries import GeometryLike
 from ..arguments.tables import Table
 from ..client import Client
 from ..resources.cloud import Cloud
@@ -76,7 +77,7 @@ def shared_client(address: str | None = None) -> Client:
 
 
 def cloud(
-    points: npt.ArrayLike | Table | str | os.PathLike[str] | bytes,
+    points: npt.ArrayLike | Table | GeometryLike | str | os.PathLike[str] | bytes,
     normals: npt.ArrayLike | None = None,
     *,
     columns: Sequence[str] | None = None,
@@ -90,7 +91,8 @@ def cloud(
     Parameters
     ----------
     points : array_like, `[n, d]`, or str, os.PathLike or bytes
-        A row of coordinates for each point, or a PLY file, as for `Client.cloud`.
+        A row of coordinates for each point, a PLY file, or a mesh or a cloud of trimesh, PyVista or Open3D, as for
+        `Client.cloud`.
     normals : array_like, `[n, d]`, optional
         Normals of any length but 0, if known. Their side is the outward one.
     columns : sequence of str, optional

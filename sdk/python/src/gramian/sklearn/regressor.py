@@ -235,7 +235,7 @@ class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
         kernels = [each.kernel for each in used]
         noise = [fit.get("noise_variances", fit.get("alpha")) for fit in self._fits]
         means = [[] if isinstance(each.mean_coefficients, Unset) else each.mean_coefficients for each in used]
-        likelihoods = [each.log_marginal_likelihood for each in answers if each.log_marginal_likelihood is not None]
+        likelihoods = [each.log_marginal_likelihood for each in answers if hasattr(each, "log_marginal_likelihood")]
         is_single = len(answers) == 1
         self.kernel_: KernelUsed | list[KernelUsed] = kernels[0] if is_single else kernels
         self.alpha_: Any = noise[0] if is_single or "noise_variances" in self._fits[0] else np.array(noise)

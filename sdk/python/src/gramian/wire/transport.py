@@ -133,6 +133,8 @@ class Transport:
         try:
             response = self.http.request(method, path, **options)
         except httpx.TransportError as error:
+            # The message of a connection has no address, and str(error) has no notes.
+            error.args = (f"{error} ({self.http.base_url})",)
             error.add_note(_advice(error, self.http.base_url))
             raise
         if not response.is_success:
@@ -157,4 +159,15 @@ def _advice(error: httpx.TransportError, url: httpx.URL) -> str:
     """Returns advice on what to check if there is no answer."""
     if isinstance(error, httpx.ReadTimeout):
         return f"{url} has not answered in time, see Client(timeout=…)."
-    return f"There is no answer from {url}, see Client(base_url=…) or GRAMIAN_URL."
+    if not isinstance(error, httpx.ConnectError | httpx.ConnectTimeout):
+        return f"There is no answer from {url}, see Client(base_url=…) or GRAMIAN_URL."
+    host = f"{url.host}:{url.port}" if url.port else url.host
+    return WAYS_ON.format(url=url, host=host)
+
+
+WAYS_ON = """\
+No service answers at {url}. Three ways on:
+ - Let this package start one: gramian.cloud(points) without GRAMIAN_URL, or with gramian.local() as client.
+ - Start one in a terminal, with the program of this package: gramian --bind {host}
+ - Name another: gramian.Client("http://…"), or the environment variable GRAMIAN_URL."""
+"""Advice if nothing listens at an address."""

@@ -37,7 +37,7 @@ pub enum MeshQuality {
 /// Optional parts of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum MeshInclude {
+pub enum MeshAttribute {
     /// Principal and mean curvatures at the vertices.
     Curvatures,
     /// Standard deviations of the positions of the vertices, and of their normals and curvatures.
@@ -82,7 +82,7 @@ request! {
         /// True if the surface ends where its points end. Default: false. A closed mesh bridges holes.
         pub open: Option<bool>,
         /// Optional parts of the answer. Default: none.
-        pub include: Option<Vec<MeshInclude>>,
+        pub include: Option<Vec<MeshAttribute>>,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{LevelSetRequest, MeshBounds, MeshInclude, MeshQuality};
+use super::{LevelSetRequest, MeshAttribute, MeshBounds, MeshQuality};
 use crate::http::fields::Fit;
 use crate::http::problem::Problem;
 use crate::http::problem::catalogue;
@@ -131,8 +131,8 @@ impl LevelSetRequest {
 
     fn asked(&mut self) -> AskedOfVertices {
         let include = self.include.take().unwrap_or_default();
-        let has_curvatures = include.contains(&MeshInclude::Curvatures);
-        let has_deviations = include.contains(&MeshInclude::Std);
+        let has_curvatures = include.contains(&MeshAttribute::Curvatures);
+        let has_deviations = include.contains(&MeshAttribute::Std);
         let geometry = geometry_request(self.surface_model, self.orientation, has_curvatures, None);
         let mut geometry = GeometryRequest { has_deviations, ..geometry };
         if self.open == Some(true) && geometry.model == SurfaceModel::Auto {

@@ -1,7 +1,7 @@
 //! `POST /v1/interpolation/batch`: functions through many lists of values, with one factorization.
 
 use super::{Work, arrays, checked_order, deviations_per_query, has_deviations, numbers_per_query};
-use crate::http::fields::{Diagnostics, Fit, MeanChoice, ValuesInclude, request};
+use crate::http::fields::{Diagnostics, Fit, MeanChoice, ValueAttribute, request};
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
 use crate::http::serve::answers::values::mean_coefficients;
@@ -36,7 +36,7 @@ request! {
         #[schema(minimum = 0, maximum = 2)]
         pub derivatives: Option<u8>,
         /// Optional parts of the answer. Default: none.
-        pub include: Option<Vec<ValuesInclude>>,
+        pub include: Option<Vec<ValueAttribute>>,
     }
 }
 

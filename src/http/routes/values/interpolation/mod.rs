@@ -4,7 +4,7 @@ mod batch;
 
 use std::sync::Arc;
 
-use crate::http::fields::{Diagnostics, Fit, MeanChoice, ValuesInclude, request};
+use crate::http::fields::{Diagnostics, Fit, MeanChoice, ValueAttribute, request};
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
 use crate::http::serve::fitted::Fits;
@@ -38,7 +38,7 @@ request! {
         #[schema(minimum = 0, maximum = 2)]
         pub derivatives: Option<u8>,
         /// Optional parts of the answer. Default: none.
-        pub include: Option<Vec<ValuesInclude>>,
+        pub include: Option<Vec<ValueAttribute>>,
     }
 }
 
@@ -154,8 +154,8 @@ fn order_of(derivatives: u8) -> JetOrder {
     [JetOrder::Value, JetOrder::Gradient, JetOrder::Hessian][usize::from(derivatives)]
 }
 
-fn has_deviations(include: Option<Vec<ValuesInclude>>) -> bool {
-    include.is_some_and(|include| include.contains(&ValuesInclude::Std))
+fn has_deviations(include: Option<Vec<ValueAttribute>>) -> bool {
+    include.is_some_and(|include| include.contains(&ValueAttribute::Std))
 }
 
 /// Returns how many numbers a query has: value, gradient and Hessian, up to the order of `derivatives`.

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use super::rows::Rows;
 use super::{
-    FamilyScore, FreeParameter, LeftOut, MAX_PATH_POINTS, ModelSelectionRequest, ModelSelectionResponse,
-    N_ALPHAS, PathEntry, SelectionCriterion, SelectionParameter,
+    AlphaScore, FamilyScore, FreeParameter, LeaveOneOutPredictions, MAX_PATH_POINTS, ModelSelectionRequest,
+    ModelSelectionResponse, N_ALPHAS, SelectionCriterion, SelectionParameter,
 };
 use crate::http::fields::kernel::nu_of;
 use crate::http::fields::{KernelFamily, KernelUsed};
@@ -383,7 +383,7 @@ fn path_over_alpha(
     selection: &Selection<'_>,
     at: &Hyperparameters,
     observer: &JobObserver,
-) -> Result<Vec<PathEntry>, NumericsError> {
+) -> Result<Vec<AlphaScore>, NumericsError> {
     let is_too_large = selection.observations.cloud.n_points() > MAX_PATH_POINTS;
     if is_too_large || !matches!(at.noise, Regularization::Uniform(_)) {
         return Ok(Vec::new());
@@ -393,7 +393,7 @@ fn path_over_alpha(
     let kernel = at.kernel_on(cloud)?;
     let alphas = default_alphas(cloud.n_points(), &kernel, N_ALPHAS);
     let scores = alpha_path(observations, at, &alphas, criterion, observer)?;
-    let entry = |(&alpha, score): (&f64, f64)| PathEntry {
+    let entry = |(&alpha, score): (&f64, f64)| AlphaScore {
         alpha,
         score: Nullable(Some(score).filter(|score| score.is_finite())),
     };
@@ -408,7 +408,7 @@ fn family_scores(selected: &SearchResult) -> Vec<FamilyScore> {
     selected.families.iter().map(one).collect()
 }
 
-impl From<LeaveOneOut> for LeftOut {
+impl From<LeaveOneOut> for LeaveOneOutPredictions {
     fn from(found: LeaveOneOut) -> Self {
         // Only points without a determined mean are null. Other numbers that are not finite left float64.
         let is_determined: Vec<bool> = found.observation_variances.iter().map(|x| !x.is_nan()).collect();

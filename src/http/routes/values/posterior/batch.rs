@@ -1,7 +1,7 @@
 //! `POST /v1/posterior/batch`: Gaussian process posteriors of many lists of values, with one factorization.
 
 use super::work::{PosteriorArrays, PosteriorParts, Work};
-use super::{PosteriorOf, PosteriorQuantity, Samples};
+use super::{PosteriorQuantity, PosteriorTarget, SampleOptions};
 use crate::http::fields::{Diagnostics, Fit, MeanChoice, request};
 use crate::http::problem::Problem;
 use crate::http::routes::operation::operation;
@@ -30,7 +30,7 @@ request! {
         /// Optional parts of the answer beside the means. Default: none.
         pub include: Option<Vec<PosteriorQuantity>>,
         /// Joint draws at all queries for each list. Default: none.
-        pub samples: Option<Samples>,
+        pub samples: Option<SampleOptions>,
         /// Probabilities between 0 and 1 for quantiles. Default: none.
         ///
         /// An empty list counts as absent.
@@ -42,7 +42,7 @@ request! {
         /// The random quantity of samples, quantiles and probabilities of exceedance. Default: `function`.
         ///
         /// `observation` needs `alpha`: with `noise_variances` the noise at queries is unknown.
-        pub of: Option<PosteriorOf>,
+        pub of: Option<PosteriorTarget>,
     }
 }
 

@@ -41,7 +41,7 @@ pub enum PosteriorQuantity {
 /// The random quantity that samples, quantiles and probabilities are of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum PosteriorOf {
+pub enum PosteriorTarget {
     /// The latent function.
     #[default]
     Function,
@@ -52,7 +52,7 @@ pub enum PosteriorOf {
 /// Functions to draw from the posterior: their number and a seed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Samples {
+pub struct SampleOptions {
     /// Number of functions to draw.
     #[schema(minimum = 1)]
     pub count: usize,
@@ -79,7 +79,7 @@ request! {
         /// Optional parts of the answer beside the mean. Default: none.
         pub include: Option<Vec<PosteriorQuantity>>,
         /// Joint draws at all queries. Default: none.
-        pub samples: Option<Samples>,
+        pub samples: Option<SampleOptions>,
         /// Probabilities between 0 and 1 for quantiles. Default: none.
         ///
         /// An empty list counts as absent.
@@ -91,7 +91,7 @@ request! {
         /// The random quantity of samples, quantiles and probabilities of exceedance. Default: `function`.
         ///
         /// `observation` needs `alpha`: with `noise_variances` the noise at queries is unknown.
-        pub of: Option<PosteriorOf>,
+        pub of: Option<PosteriorTarget>,
     }
 }
 

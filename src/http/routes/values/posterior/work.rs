@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{PosteriorOf, PosteriorQuantity as Q, Samples};
+use super::{PosteriorQuantity as Q, PosteriorTarget, SampleOptions};
 use crate::http::fields::{Diagnostics, Fit};
 use crate::http::problem::Problem;
 use crate::http::serve::answers::values::mean_coefficients;
@@ -32,11 +32,11 @@ use gramian_numerics::regression::sums::jets::JetOrder;
 /// Optional parts of an answer, beside the means.
 pub struct PosteriorParts {
     pub include: Vec<Q>,
-    pub samples: Option<Samples>,
+    pub samples: Option<SampleOptions>,
     pub quantiles: Option<Vec<f64>>,
     pub threshold: Option<f64>,
     /// The random quantity that samples, quantiles and probabilities are of.
-    pub of: PosteriorOf,
+    pub of: PosteriorTarget,
 }
 
 impl PosteriorParts {
@@ -106,7 +106,7 @@ impl PosteriorParts {
     fn check_noise(&self, plan: &PlannedValues) -> Result<(), Problem> {
         let asked = if self.wants(Q::ObservationVariances) {
             ("observation_variances", "/include")
-        } else if self.of == PosteriorOf::Observation {
+        } else if self.of == PosteriorTarget::Observation {
             ("observation", "/of")
         } else {
             return Ok(());
@@ -268,7 +268,7 @@ impl PosteriorArrays {
         let shape = |of_each: &[usize]| [&leading, of_each].concat();
         // Alpha is absent with noise per point, and `check_noise` then refuses everything that needs it.
         let alpha = diagnostics.alpha.unwrap_or_default();
-        let noise = if asked.of == PosteriorOf::Observation { alpha } else { 0.0 };
+        let noise = if asked.of == PosteriorTarget::Observation { alpha } else { 0.0 };
         let samples = match (asked.samples, &covariance) {
             (Some(samples), Some(covariance)) => {
                 let prior_variance = function()?.solver.kernel().at_zero() * scale;
@@ -319,7 +319,7 @@ fn draws(
     root: &Root,
     means: &[f64],
     m: usize,
-    Samples { count, seed }: Samples,
+    SampleOptions { count, seed }: SampleOptions,
     observer: &JobObserver,
 ) -> Result<Vec<f64>, NumericsError> {
     let mut all = Vec::with_capacity(means.len() * count);

@@ -4,11 +4,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .border import Border
+    from .alpha_score import AlphaScore
     from .bounding_box import BoundingBox
     from .cloud import Cloud
+    from .cloud_input import CloudInput
     from .cloud_list import CloudList
-    from .cloud_ref import CloudRef
     from .cloud_request import CloudRequest
     from .coarse_request import CoarseRequest
     from .coarse_response import CoarseResponse
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from .flag import Flag
     from .flag_reason import FlagReason
     from .free_parameter import FreeParameter
-    from .geometry_include import GeometryInclude
+    from .geometry_attribute import GeometryAttribute
     from .health import Health
     from .hyperparameters import Hyperparameters
     from .interpolation_batch_request import InterpolationBatchRequest
@@ -50,14 +50,13 @@ if TYPE_CHECKING:
     from .laplace_beltrami_sparse_matrix_response import (
         LaplaceBeltramiSparseMatrixResponse,
     )
-    from .left_out import LeftOut
+    from .leave_one_out_predictions import LeaveOneOutPredictions
     from .level_set_request import LevelSetRequest
     from .level_set_response import LevelSetResponse
-    from .link import Link
     from .mean_choice import MeanChoice
     from .means_level import MeansLevel
+    from .mesh_attribute import MeshAttribute
     from .mesh_bounds import MeshBounds
-    from .mesh_include import MeshInclude
     from .mesh_part import MeshPart
     from .mesh_quality import MeshQuality
     from .model_selection_request import ModelSelectionRequest
@@ -67,18 +66,19 @@ if TYPE_CHECKING:
     from .normals_response import NormalsResponse
     from .operation_name import OperationName
     from .orientation_choice import OrientationChoice
-    from .path_entry import PathEntry
     from .posterior_batch_request import PosteriorBatchRequest
     from .posterior_batch_response import PosteriorBatchResponse
-    from .posterior_of import PosteriorOf
     from .posterior_quantity import PosteriorQuantity
     from .posterior_request import PosteriorRequest
     from .posterior_response import PosteriorResponse
+    from .posterior_target import PosteriorTarget
     from .problem import Problem
     from .region import Region
+    from .region_adjacency import RegionAdjacency
+    from .region_overlap import RegionOverlap
     from .regions_request import RegionsRequest
     from .regions_response import RegionsResponse
-    from .samples import Samples
+    from .sample_options import SampleOptions
     from .selection_criterion import SelectionCriterion
     from .selection_parameter import SelectionParameter
     from .sides_request import SidesRequest
@@ -87,7 +87,7 @@ if TYPE_CHECKING:
     from .solver_choice import SolverChoice
     from .solver_used import SolverUsed
     from .spacing import Spacing
-    from .stencils_used import StencilsUsed
+    from .stencil_counts import StencilCounts
     from .surface import Surface
     from .surface_gradient_matrix_request import SurfaceGradientMatrixRequest
     from .surface_gradient_matrix_response import SurfaceGradientMatrixResponse
@@ -102,18 +102,18 @@ if TYPE_CHECKING:
     from .surface_model_choice import SurfaceModelChoice
     from .surface_model_used import SurfaceModelUsed
     from .tile_regions import TileRegions
-    from .values_include import ValuesInclude
+    from .value_attribute import ValueAttribute
     from .version import Version
     from .vertex_support import VertexSupport
     from .warning import Warning_
     from .warning_code import WarningCode
 
 __all__ = (
-    "Border",
+    "AlphaScore",
     "BoundingBox",
     "Cloud",
+    "CloudInput",
     "CloudList",
-    "CloudRef",
     "CloudRequest",
     "CoarseRequest",
     "CoarseResponse",
@@ -129,7 +129,7 @@ __all__ = (
     "Flag",
     "FlagReason",
     "FreeParameter",
-    "GeometryInclude",
+    "GeometryAttribute",
     "Health",
     "Hyperparameters",
     "InterpolationBatchRequest",
@@ -151,14 +151,13 @@ __all__ = (
     "LaplaceBeltramiResponse",
     "LaplaceBeltramiSparseMatrixRequest",
     "LaplaceBeltramiSparseMatrixResponse",
-    "LeftOut",
+    "LeaveOneOutPredictions",
     "LevelSetRequest",
     "LevelSetResponse",
-    "Link",
     "MeanChoice",
     "MeansLevel",
+    "MeshAttribute",
     "MeshBounds",
-    "MeshInclude",
     "MeshPart",
     "MeshQuality",
     "ModelSelectionRequest",
@@ -168,18 +167,19 @@ __all__ = (
     "NormalsResponse",
     "OperationName",
     "OrientationChoice",
-    "PathEntry",
     "PosteriorBatchRequest",
     "PosteriorBatchResponse",
-    "PosteriorOf",
     "PosteriorQuantity",
     "PosteriorRequest",
     "PosteriorResponse",
+    "PosteriorTarget",
     "Problem",
     "Region",
+    "RegionAdjacency",
+    "RegionOverlap",
     "RegionsRequest",
     "RegionsResponse",
-    "Samples",
+    "SampleOptions",
     "SelectionCriterion",
     "SelectionParameter",
     "SidesRequest",
@@ -188,7 +188,7 @@ __all__ = (
     "SolverChoice",
     "SolverUsed",
     "Spacing",
-    "StencilsUsed",
+    "StencilCounts",
     "Surface",
     "SurfaceGradientMatrixRequest",
     "SurfaceGradientMatrixResponse",
@@ -199,7 +199,7 @@ __all__ = (
     "SurfaceModelChoice",
     "SurfaceModelUsed",
     "TileRegions",
-    "ValuesInclude",
+    "ValueAttribute",
     "Version",
     "VertexSupport",
     "WarningCode",
@@ -208,11 +208,11 @@ __all__ = (
 
 if not TYPE_CHECKING:
     _MODULES = {
-        "Border": ".border",
+        "AlphaScore": ".alpha_score",
         "BoundingBox": ".bounding_box",
         "Cloud": ".cloud",
+        "CloudInput": ".cloud_input",
         "CloudList": ".cloud_list",
-        "CloudRef": ".cloud_ref",
         "CloudRequest": ".cloud_request",
         "CoarseRequest": ".coarse_request",
         "CoarseResponse": ".coarse_response",
@@ -228,7 +228,7 @@ if not TYPE_CHECKING:
         "Flag": ".flag",
         "FlagReason": ".flag_reason",
         "FreeParameter": ".free_parameter",
-        "GeometryInclude": ".geometry_include",
+        "GeometryAttribute": ".geometry_attribute",
         "Health": ".health",
         "Hyperparameters": ".hyperparameters",
         "InterpolationBatchRequest": ".interpolation_batch_request",
@@ -250,14 +250,13 @@ if not TYPE_CHECKING:
         "LaplaceBeltramiResponse": ".laplace_beltrami_response",
         "LaplaceBeltramiSparseMatrixRequest": ".laplace_beltrami_sparse_matrix_request",
         "LaplaceBeltramiSparseMatrixResponse": ".laplace_beltrami_sparse_matrix_response",
-        "LeftOut": ".left_out",
+        "LeaveOneOutPredictions": ".leave_one_out_predictions",
         "LevelSetRequest": ".level_set_request",
         "LevelSetResponse": ".level_set_response",
-        "Link": ".link",
         "MeanChoice": ".mean_choice",
         "MeansLevel": ".means_level",
+        "MeshAttribute": ".mesh_attribute",
         "MeshBounds": ".mesh_bounds",
-        "MeshInclude": ".mesh_include",
         "MeshPart": ".mesh_part",
         "MeshQuality": ".mesh_quality",
         "ModelSelectionRequest": ".model_selection_request",
@@ -267,18 +266,19 @@ if not TYPE_CHECKING:
         "NormalsResponse": ".normals_response",
         "OperationName": ".operation_name",
         "OrientationChoice": ".orientation_choice",
-        "PathEntry": ".path_entry",
         "PosteriorBatchRequest": ".posterior_batch_request",
         "PosteriorBatchResponse": ".posterior_batch_response",
-        "PosteriorOf": ".posterior_of",
         "PosteriorQuantity": ".posterior_quantity",
         "PosteriorRequest": ".posterior_request",
         "PosteriorResponse": ".posterior_response",
+        "PosteriorTarget": ".posterior_target",
         "Problem": ".problem",
         "Region": ".region",
+        "RegionAdjacency": ".region_adjacency",
+        "RegionOverlap": ".region_overlap",
         "RegionsRequest": ".regions_request",
         "RegionsResponse": ".regions_response",
-        "Samples": ".samples",
+        "SampleOptions": ".sample_options",
         "SelectionCriterion": ".selection_criterion",
         "SelectionParameter": ".selection_parameter",
         "SidesRequest": ".sides_request",
@@ -287,7 +287,7 @@ if not TYPE_CHECKING:
         "SolverChoice": ".solver_choice",
         "SolverUsed": ".solver_used",
         "Spacing": ".spacing",
-        "StencilsUsed": ".stencils_used",
+        "StencilCounts": ".stencil_counts",
         "Surface": ".surface",
         "SurfaceGradientMatrixRequest": ".surface_gradient_matrix_request",
         "SurfaceGradientMatrixResponse": ".surface_gradient_matrix_response",
@@ -298,7 +298,7 @@ if not TYPE_CHECKING:
         "SurfaceModelChoice": ".surface_model_choice",
         "SurfaceModelUsed": ".surface_model_used",
         "TileRegions": ".tile_regions",
-        "ValuesInclude": ".values_include",
+        "ValueAttribute": ".value_attribute",
         "Version": ".version",
         "VertexSupport": ".vertex_support",
         "Warning_": ".warning",

@@ -13,7 +13,7 @@ from ..types import UNSET, Unset, without_unset
 if TYPE_CHECKING:
     from ..models.hyperparameters import Hyperparameters
     from ..models.kernel_used import KernelUsed
-    from ..models.stencils_used import StencilsUsed
+    from ..models.stencil_counts import StencilCounts
     from ..models.warning import Warning_
 
 
@@ -68,7 +68,7 @@ class Diagnostics:
             members may change in any version, and one of another version may be refused.
         reach (int | Unset): Number of positions around a point on which the answer there depends, with local
             regressions.
-        stencils (StencilsUsed | Unset): Number of rows of a sparse operator by how their weights were computed.
+        stencils (StencilCounts | Unset): Number of rows of a sparse operator by how their weights were computed.
         surface (Diagnostics | Unset): Diagnostics of an answer: the numbers used, the method, and its accuracy.
     """
 
@@ -96,7 +96,7 @@ class Diagnostics:
     noise_deviation: float | Unset = UNSET
     hyperparameters: Hyperparameters | Unset = UNSET
     reach: int | Unset = UNSET
-    stencils: StencilsUsed | Unset = UNSET
+    stencils: StencilCounts | Unset = UNSET
     surface: Diagnostics | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
@@ -222,7 +222,7 @@ class Diagnostics:
     def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
         from ..models.hyperparameters import Hyperparameters
         from ..models.kernel_used import KernelUsed
-        from ..models.stencils_used import StencilsUsed
+        from ..models.stencil_counts import StencilCounts
         from ..models.warning import Warning_
 
         d = dict(src_dict)
@@ -285,11 +285,11 @@ class Diagnostics:
         reach = d.pop("reach", UNSET)
 
         _stencils = d.pop("stencils", UNSET)
-        stencils: StencilsUsed | Unset
+        stencils: StencilCounts | Unset
         if isinstance(_stencils, Unset):
             stencils = UNSET
         else:
-            stencils = StencilsUsed.from_dict(_stencils)
+            stencils = StencilCounts.from_dict(_stencils)
 
         _surface = d.pop("surface", UNSET)
         surface: Diagnostics | Unset

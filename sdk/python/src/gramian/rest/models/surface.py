@@ -10,7 +10,7 @@ from ..models.surface_model_choice import SurfaceModelChoice
 from ..types import UNSET, Unset, without_unset
 
 if TYPE_CHECKING:
-    from ..models.cloud_ref import CloudRef
+    from ..models.cloud_input import CloudInput
     from ..models.kernel import Kernel
 
 
@@ -24,7 +24,7 @@ class Surface:
     It may come from another cloud, kernel or alpha than the values. Absent fields are taken from the request.
 
         Attributes:
-            cloud (CloudRef | Unset): A cloud, given by the id of a registered cloud or by its points. Exactly one of `id`
+            cloud (CloudInput | Unset): A cloud, given by the id of a registered cloud or by its points. Exactly one of `id`
                 and `points` is
                 given.
             kernel (Kernel | Unset): A kernel `k(x, y) = variance · φ(r²)`.
@@ -39,7 +39,7 @@ class Surface:
             model (SurfaceModelChoice | Unset): The function whose level set is the surface.
     """
 
-    cloud: CloudRef | Unset = UNSET
+    cloud: CloudInput | Unset = UNSET
     kernel: Kernel | Unset = UNSET
     alpha: float | Unset = UNSET
     noise_variances: list[float] | Unset = UNSET
@@ -91,16 +91,16 @@ class Surface:
 
     @classmethod
     def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
-        from ..models.cloud_ref import CloudRef
+        from ..models.cloud_input import CloudInput
         from ..models.kernel import Kernel
 
         d = dict(src_dict)
         _cloud = d.pop("cloud", UNSET)
-        cloud: CloudRef | Unset
+        cloud: CloudInput | Unset
         if isinstance(_cloud, Unset):
             cloud = UNSET
         else:
-            cloud = CloudRef.from_dict(_cloud)
+            cloud = CloudInput.from_dict(_cloud)
 
         _kernel = d.pop("kernel", UNSET)
         kernel: Kernel | Unset

@@ -8,8 +8,8 @@ from attrs import define as _attrs_define
 from ..types import without_unset
 
 if TYPE_CHECKING:
-    from ..models.border import Border
     from ..models.region import Region
+    from ..models.region_adjacency import RegionAdjacency
 
 
 T = TypeVar("T", bound="TileRegions")
@@ -21,12 +21,12 @@ class TileRegions:
 
     Attributes:
         regions (list[Region]): The regions.
-        borders (list[Border]): Their borders.
+        borders (list[RegionAdjacency]): Their borders.
         n_edges (int): The number of edges that the points would have on a surface that is sampled well.
     """
 
     regions: list[Region]
-    borders: list[Border]
+    borders: list[RegionAdjacency]
     n_edges: int
 
     __repr__ = without_unset
@@ -58,8 +58,8 @@ class TileRegions:
 
     @classmethod
     def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
-        from ..models.border import Border
         from ..models.region import Region
+        from ..models.region_adjacency import RegionAdjacency
 
         d = dict(src_dict)
         regions = []
@@ -72,7 +72,7 @@ class TileRegions:
         borders = []
         _borders = d.pop("borders")
         for borders_item_data in _borders:
-            borders_item = Border.from_dict(borders_item_data)
+            borders_item = RegionAdjacency.from_dict(borders_item_data)
 
             borders.append(borders_item)
 

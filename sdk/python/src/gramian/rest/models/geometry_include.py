@@ -1,9 +1,0 @@
-from enum import StrEnum
-
-
-class GeometryInclude(StrEnum):
-    EDGE_NORMALS = "edge_normals"
-    STD = "std"
-
-    def __str__(self) -> str:
-        return str(self.value)

@@ -1,9 +1,0 @@
-from enum import StrEnum
-
-
-class PosteriorOf(StrEnum):
-    FUNCTION = "function"
-    OBSERVATION = "observation"
-
-    def __str__(self) -> str:
-        return str(self.value)

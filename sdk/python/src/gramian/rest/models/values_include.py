@@ -1,8 +1,0 @@
-from enum import StrEnum
-
-
-class ValuesInclude(StrEnum):
-    STD = "std"
-
-    def __str__(self) -> str:
-        return str(self.value)
