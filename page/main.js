@@ -12,6 +12,7 @@ import "./control/leaving/saving.js";
 import { fillForm, isStep, keepInLink } from "./control/settings.js";
 import { requestOf } from "./model/operations.js";
 import { saveKey, savedKey } from "./model/service.js";
+import { showEffects } from "./words/effects.js";
 import { DEFAULTS, fromHash } from "./model/state.js";
 
 /** Points up to which every movement of a slider is answered. */
@@ -34,12 +35,17 @@ const REQUEST_SETTINGS = [
 ];
 events.addEventListener("settings", (event) => {
   const { changed, isPush = false } = /** @type {CustomEvent} */ (event).detail;
+  // A length scale is that of a kernel.
+  if (changed.lengthScale > 0 && page.settings.family === "auto") changed.family = "gauss";
   Object.assign(page.settings, changed);
   fillForm();
   keepInLink(isPush);
   if ("example" in changed) return loadExample();
-  if (Object.keys(changed).some((name) => REQUEST_SETTINGS.includes(name))) return ask();
-  return showPicture(changed);
+  // The answer that comes with an example has no principal directions.
+  const isMissing = changed.directions && page.answer === page.cloud?.known;
+  if (isMissing || Object.keys(changed).some((name) => REQUEST_SETTINGS.includes(name))) ask();
+  else showPicture(changed);
+  showEffects();
 });
 
 form.addEventListener("input", (event) => {
@@ -76,9 +82,7 @@ function isSmall() {
 function logarithmic(slider, name, settingOf) {
   const apply = () => {
     const value = Number(settingOf(Number(slider.value)).toPrecision(3));
-    const isKernel = name === "lengthScale" && page.settings.family === "auto";
-    const changed = isKernel ? { lengthScale: value, family: "gauss" } : { [name]: value };
-    change(changed, { isPush: isStep(slider) });
+    change({ [name]: value }, { isPush: isStep(slider) });
   };
   slider.addEventListener("input", () => isSmall() && apply());
   slider.addEventListener("change", apply);

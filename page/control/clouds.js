@@ -18,6 +18,9 @@ import { fillForm, keepInLink } from "./settings.js";
 
 /** @import { Cloud, ReadCloud, Remedy } from "../types.d.ts" */
 
+/** Points up to which repeated ones are looked for at once, as the reader of files does beside the page. */
+const CHECKED = 20_000;
+
 /** Shows the example or the file that the settings name. */
 export async function loadExample() {
   const { example, fileName } = page.settings;
@@ -73,6 +76,7 @@ async function load(make) {
     const cloud = await make();
     if (page.loading !== loading) return;
     stopAsking();
+    if (cloud.points.rows <= CHECKED) cloud.repeats ??= repeatsOf(cloud.points);
     Object.assign(page, { cloud, cloudId: undefined });
     if (cloud.example === undefined) page.own = cloud;
     at("cloud").textContent = descriptionOf(cloud);

@@ -1,16 +1,22 @@
 // @ts-check
 // Pictures and files that leave the page.
 
+import { csvOf, plyOf, vectors } from "../../model/leaving/export.js";
 import { OPERATIONS, requestOf } from "../../model/operations.js";
 import { download } from "../../model/service.js";
+import { inTurns } from "../../model/turns.js";
+import { rgb, shareOf, SUPPORT, textureOf } from "../../view/colours.js";
 import { element } from "../../view/readout.js";
 import { all, at } from "../elements.js";
 import { page, scene } from "../page.js";
+import { chosen, rangeNow } from "../range.js";
 import { idOf, repeated } from "../registered.js";
 import { refuse } from "../../words/refusal.js";
 
-/** @type {Record<string, string>} */
-const SAVED = { ply: "model/ply", glb: "model/gltf-binary" };
+/** @import { Answer, Cloud, Column, Quantity } from "../../types.d.ts" */
+
+/** Colour of points whose value is not known, as in the picture. */
+const PLAIN = [140, 153, 173];
 
 for (const button of all("[data-save]")) {
   button.addEventListener("click", () => save(button.dataset.save ?? "").catch(refuse));
@@ -18,15 +24,82 @@ for (const button of all("[data-save]")) {
 
 /** @param {string} kind */
 async function save(kind) {
-  const { cloud, settings } = page;
+  const { cloud } = page;
   if (!cloud) return;
+  const stem = cloud.name.replace(/\.[^.]*$/, "");
   if (kind === "png" || kind === "plain") return offer(await pictureOf(kind === "png"), `${cloud.name}.png`);
-  const file = await repeated(async () => {
-    const body = { cloud: { id: await idOf(cloud) }, ...requestOf(settings) };
-    const asked = { mediaType: SAVED[kind], nPoints: cloud.points.rows };
-    return download(OPERATIONS[settings.operation].path, body, asked);
+  return offer(kind === "glb" ? await glb(cloud) : await tableOf(cloud, kind), `${stem}.${kind}`);
+}
+
+/** The mesh in a file of the service. @param {Cloud} cloud */
+function glb(cloud) {
+  return repeated(async () => {
+    const body = { cloud: { id: await idOf(cloud) }, ...requestOf(page.settings) };
+    const asked = { mediaType: "model/gltf-binary", nPoints: cloud.points.rows };
+    return download(OPERATIONS[page.settings.operation].path, body, asked);
   });
-  return offer(file, `${cloud.name.replace(/\.[^.]*$/, "")}.${kind}`);
+}
+
+/**
+ * Points or vertices with their colours on screen, all quantities of the answer, and the columns of the file.
+ *
+ * @param {Cloud} cloud
+ * @param {string} kind
+ */
+async function tableOf(cloud, kind) {
+  /** @type {Answer["tensors"]} */
+  const tensors = page.answer?.tensors ?? {};
+  const { vertices, cells } = tensors;
+  const normals = tensors.normals ?? cloud.normals;
+  const points = vertices ?? cloud.points;
+  const quantity = chosen();
+  /** @type {Column[]} */
+  const columns = normals ? vectors(["nx", "ny", "nz"], normals) : [];
+  // MeshLab colours by the property of this name.
+  if (quantity && !quantity.channels) columns.push({ name: "quality", values: quantity.values });
+  for (const { id, values } of page.quantities) {
+    if (id !== "colours" && !id.startsWith("given.")) columns.push({ name: nameOf(id), values });
+  }
+  if (!vertices) for (const [name, values] of cloud.values) columns.push({ name, values });
+  const table = { points, columns, colours: await coloursOf(points.rows, quantity) };
+  return kind === "ply" ? plyOf({ ...table, cells }) : csvOf(table);
+}
+
+/** The name of a quantity in files, in the singular: principal_curvature_0. */
+function nameOf(id) {
+  return id.replace(/s(?=\.|$)/, "").replace(".", "_");
+}
+
+/**
+ * Red, green and blue of each point, as on screen but without light.
+ *
+ * @param {number} n
+ * @param {Quantity | undefined} quantity
+ */
+async function coloursOf(n, quantity) {
+  const colours = new Uint8Array(3 * n);
+  const support = page.settings.colour === "support" ? page.answer?.fields.support : undefined;
+  const range = rangeNow(quantity);
+  const { data, width, height } = textureOf(range);
+  await inTurns(n, (from, to) => {
+    for (let row = from; row < to; row++) {
+      if (support) colours.set(bytesOf(SUPPORT[support[row]]), 3 * row);
+      else if (quantity?.channels) for (let of = 0; of < 3; of++) colours[3 * row + of] = quantity.channels[of][row];
+      else {
+        const share = quantity ? shareOf(quantity.values[row], range) : NaN;
+        const off = range.full > 0 ? (quantity?.deviations?.[row] ?? 0) / range.full : 0;
+        const level = Math.min(Math.floor(Math.min(off, 1) * height), height - 1);
+        const at = 4 * (level * width + Math.round(Math.min(Math.max(share, 0), 1) * (width - 1)));
+        if (Number.isNaN(share)) colours.set(PLAIN, 3 * row);
+        else for (let of = 0; of < 3; of++) colours[3 * row + of] = data[(Number.isNaN(at) ? 0 : at) + of];
+      }
+    }
+  });
+  return colours;
+}
+
+function bytesOf(hex) {
+  return rgb(hex).map((channel) => Math.round(255 * channel));
 }
 
 export function offer(blob, name) {

@@ -66,6 +66,7 @@ static FILES: &[File] = files!["page":
     "view/readout.js" SCRIPT,
     "view/scene.js" SCRIPT,
     "view/shading.js" SCRIPT,
+    "words/effects.js" SCRIPT,
     "words/problems.js" SCRIPT,
     "words/refusal.js" SCRIPT,
     "words/warnings.js" SCRIPT,
