@@ -33,8 +33,10 @@ pub enum SolverChoice {
 pub enum DuplicatePolicy {
     /// Answer 422 `duplicate-points`.
     #[default]
+    #[value(help = "Refuse the cloud, and name the points")]
     Refuse,
     /// Average their values. In matrices, the columns of merged points split the weight equally.
+    #[value(help = "Count them once")]
     Merge,
 }
 

@@ -124,3 +124,18 @@ fn warnings_stand_before_the_line_of_success_and_count_points() {
     let quiet = folder.run(&["curvatures", "cube.xyz", "-o", "cube.csv", "--surface", "regression", "-q"]);
     assert_eq!((code(&quiet), told(&quiet)), (Some(0), String::new()));
 }
+
+#[test]
+fn the_help_of_files_speaks_of_files() {
+    let folder = Folder::new("help");
+    for command in ["normals", "curvatures", "mesh"] {
+        let help = String::from_utf8(folder.run(&[command, "--help"]).stdout).unwrap();
+        for part in
+            ["--alpha", "--kernel", "--duplicates", ".vtp", "Exit codes: 0", "- alone is standard input"]
+        {
+            assert!(help.contains(part), "{command}: {part} in {help}");
+        }
+        let foreign = ["422", "HTTP", "--bind"];
+        assert!(!foreign.iter().any(|word| help.contains(word)), "{command}: {help}");
+    }
+}
