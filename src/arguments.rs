@@ -93,7 +93,10 @@ impl Arguments {
 }
 
 /// The variable that a refused value comes from, if its option is not among the arguments.
-fn variable_of(error: &clap::Error, arguments: impl Iterator<Item = impl AsRef<OsStr>>) -> Option<String> {
+fn variable_of(
+    error: &clap::Error,
+    mut arguments: impl Iterator<Item = impl AsRef<OsStr>>,
+) -> Option<String> {
     let Some(ContextValue::String(option)) = error.get(ContextKind::InvalidArg) else { return None };
     let long = option.split_whitespace().next()?.strip_prefix("--")?;
     let settings = Config::augment_args(clap::Command::new("serve"));
@@ -103,7 +106,7 @@ fn variable_of(error: &clap::Error, arguments: impl Iterator<Item = impl AsRef<O
     let is_flag = |argument: &OsStr| {
         argument.to_str().is_some_and(|text| text == flag || text.starts_with(&format!("{flag}=")))
     };
-    let is_given = arguments.map(|argument| is_flag(argument.as_ref())).any(|is_flag| is_flag);
+    let is_given = arguments.any(|argument| is_flag(argument.as_ref()));
     (!is_given && std::env::var_os(variable).is_some()).then(|| variable.to_owned())
 }
 

@@ -74,8 +74,8 @@ def run(base, page):
     return n_failed
 
 
-def examples_of(page):
-    """Returns the examples of a page: (line, script, language of the answer, expected answer)."""
+def blocks_of(page):
+    """Returns the fenced blocks of a page: (line, language, text)."""
     blocks, language, start, body = [], None, 0, []
     for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), 1):
         if not line.startswith("```"):
@@ -85,7 +85,12 @@ def examples_of(page):
         else:
             blocks.append((start, language, "\n".join(body)))
             language = None
-    examples = []
+    return blocks
+
+
+def examples_of(page):
+    """Returns the examples of a page: (line, script, language of the answer, expected answer)."""
+    blocks, examples = blocks_of(page), []
     for index, (line, language, script) in enumerate(blocks):
         if language == "sh" and re.search(r"\bcurl\b", script):
             _, kind, expected = blocks[index + 1] if index + 1 < len(blocks) else (0, None, "")

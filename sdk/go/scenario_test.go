@@ -158,7 +158,7 @@ func problemOf(t *testing.T, err error) gramian.Problem {
 }
 
 func cloud() gramian.CloudInput {
-	reference := gramian.NewCloudRef()
+	reference := gramian.NewCloudInput()
 	reference.SetId(cloudID)
 	return *reference
 }

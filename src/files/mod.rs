@@ -1,77 +1,39 @@
 //! Subcommands that answer files without a server. They send the request through the same router, in this
 //! process and without a port, so that answers and refusals are those of the service.
 
+mod command;
+mod failure;
 mod output;
+mod places;
 mod progress;
 mod read;
+mod report;
+mod request;
 mod router;
 mod tensors;
+mod words;
+mod write;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 use axum::body::Bytes;
-use serde_json::{Map, Value, json};
 
 use crate::config::Config;
+use crate::http;
+pub use command::FileCommand;
+use command::{Ask, Files};
+use failure::Failure;
 use gramian_host::process::signals::Signals;
-use output::Output;
-use router::{Answerer, Failure};
+use places::{Asked, Task, bytes_in, is_standard, shown};
+use read::FileCloud;
+use request::CloudRequest;
+use router::Answerer;
+use write::{Answer, Content};
 
 const JSON: &str = "application/json";
 
-/// Media types of answers by the ending of a file.
-const ANSWERS: [(&str, &str); 6] = [
-    ("json", JSON),
-    ("safetensors", "application/x-safetensors"),
-    ("npy", "application/x-npy"),
-    ("ply", "model/ply"),
-    ("glb", "model/gltf-binary"),
-    ("obj", "model/obj"),
-];
-
-/// A subcommand that reads a file and writes a file.
-#[derive(clap::Subcommand)]
-pub enum FileCommand {
-    /// Compute normals of a cloud: gramian normals scan.ply -o scan-normals.ply
-    Normals(OfCloud),
-    /// Compute curvatures of a cloud: gramian curvatures scan.ply -o scan-curvatures.ply
-    Curvatures(OfCloud),
-    /// Mesh the surface of a cloud: gramian mesh scan.ply -o scan.glb
-    Mesh(OfCloud),
-    /// Answer a request: gramian ask laplace-beltrami/sparse-matrix request.json -o matrix.safetensors
-    Ask {
-        /// The end of a path under /v1, such as interpolation or laplace-beltrami/matrix.
-        operation: String,
-        /// A file with the request as JSON.
-        request: PathBuf,
-        /// The file of the answer: .json, .safetensors, .npy, .ply, .glb or .obj. Default: JSON on
-        /// standard output.
-        #[arg(short, long)]
-        output: Option<PathBuf>,
-    },
-}
-
-/// A cloud in a file, and where its answer goes.
-#[derive(clap::Args)]
-pub struct OfCloud {
-    #[arg(help = format!("A file of points: {}", read::formats::endings()), long_help = read::formats::help())]
-    cloud: PathBuf,
-    /// The file of the answer: .ply, .json or .safetensors, and for meshes .glb or .obj.
-    #[arg(short, long)]
-    output: PathBuf,
-    /// Add standard deviations.
-    #[arg(long)]
-    std: bool,
-    /// Further members of the request as JSON, such as '{"alpha": 1e-6, "duplicates": "merge"}'.
-    #[arg(long, value_name = "JSON")]
-    with: Option<String>,
-}
-
-/// Answers a subcommand.
-///
-/// The exit code is 0 for an answer, 1 if a file cannot be read or written, 2 for wrong arguments, 3 if the
-/// request was refused, and 4 if it failed. After a signal it is 128 and the signal's number.
+/// Answers a subcommand. Its help lists the exit codes.
 pub fn run(command: FileCommand, config: Config) -> ExitCode {
     let answered = tokio::runtime::Runtime::new()
         .map_err(|error| Failure::File(format!("the runtime does not start: {error}")))
@@ -84,13 +46,20 @@ pub fn run(command: FileCommand, config: Config) -> ExitCode {
     match answered {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            eprintln!("gramian: {failure}");
+            tell(&failure.to_string());
             ExitCode::from(failure.exit_code())
         }
     }
 }
 
-/// Answers a subcommand. A signal drops what is under way, and the file beside the output with it.
+/// Writes a line for people to standard error.
+fn tell(text: &str) {
+    if !text.is_empty() {
+        eprintln!("gramian: {text}");
+    }
+}
+
+/// Answers a subcommand. A signal drops what is under way, and the files beside outputs with it.
 async fn answer_until_told_to_end(command: FileCommand, config: Config) -> Result<(), Failure> {
     let signals = Signals::new();
     let mut signals =
@@ -102,42 +71,112 @@ async fn answer_until_told_to_end(command: FileCommand, config: Config) -> Resul
 }
 
 async fn answer(command: FileCommand, config: Config) -> Result<(), Failure> {
-    match command {
-        FileCommand::Normals(of) => of_cloud("normals", &of, config).await,
-        FileCommand::Curvatures(of) => of_cloud("curvatures", &of, config).await,
-        FileCommand::Mesh(of) => of_cloud("level-set", &of, config).await,
-        FileCommand::Ask { operation, request, output } => {
-            let accept = output.as_deref().map_or(Ok(JSON), media_type_of)?;
-            let output = Output::prepare(output.as_deref(), &request)?;
-            let body = on_thread(move || bytes_in(&request)).await?;
-            let answerer = Answerer::start(config).await?;
-            output.write(answerer.compute(&format!("/v1/{operation}"), body, accept).await?).await
+    let (of, operation) = match command {
+        FileCommand::Normals(of) => (of, "normals"),
+        FileCommand::Curvatures(of) => (of, "curvatures"),
+        FileCommand::Mesh(of) => {
+            let request = CloudRequest::of_mesh(&of)?;
+            let asked = asked(&of.files, Content::Mesh, "mesh");
+            let asked = Asked { output: of.output.as_deref(), to: of.to.as_deref(), ..asked };
+            return answer_clouds(asked, &of.files, &request, config).await;
         }
-    }
+        FileCommand::Ask(ask) => return answer_request(ask, config).await,
+    };
+    let request = CloudRequest::of_points(operation, &of.fit)?;
+    let asked = asked(&of.files, Content::Points, operation);
+    let asked = Asked { output: of.output.as_deref(), to: of.to.as_deref(), ..asked };
+    answer_clouds(asked, &of.files, &request, config).await
 }
 
-async fn of_cloud(operation: &str, of: &OfCloud, config: Config) -> Result<(), Failure> {
-    let accept = media_type_of(&of.output)?;
-    let mut request = match &of.with {
-        None => Map::new(),
-        Some(text) => serde_json::from_str(text)
-            .map_err(|error| Failure::Argument(format!("--with is not a JSON object: {error}")))?,
-    };
-    if of.std {
-        let include = request.entry("include").or_insert(json!([])).as_array_mut();
-        let include = include.ok_or_else(|| Failure::Argument("--with: include is not a list".to_owned()))?;
-        if !include.contains(&json!("std")) {
-            include.push(json!("std"));
+fn asked<'a>(files: &'a Files, content: Content, suffix: &'a str) -> Asked<'a> {
+    let is_forced = files.manners.force;
+    Asked { inputs: &files.clouds, output: None, to: None, content, suffix, is_forced }
+}
+
+/// Answers one cloud after another. A cloud that fails does not keep the others from their answers.
+async fn answer_clouds(
+    asked: Asked<'_>,
+    files: &Files,
+    request: &CloudRequest,
+    config: Config,
+) -> Result<(), Failure> {
+    let tasks = asked.tasks()?;
+    let answerer = Answerer::start(config, files.manners.quiet).await?;
+    let mut last = Ok(());
+    for task in tasks {
+        let input = task.input.clone();
+        let answered = answer_cloud(&answerer, task, files, request).await;
+        let about = |problem: &_| format!("{}: {}", shown(&input), words::of_cloud_problem(problem));
+        if let Err(failure) = answered
+            && let Err(before) = std::mem::replace(&mut last, Err(failure.in_words(about)))
+        {
+            tell(&before.to_string());
         }
     }
-    let output = Output::prepare(Some(&of.output), &of.cloud)?;
-    let cloud = of.cloud.clone();
-    let body = on_thread(move || cloud_in(&cloud)).await?;
-    let answerer = Answerer::start(config).await?;
-    let cloud = answerer.register(tensors::MEDIA_TYPE, body).await?;
-    request.insert("cloud".to_owned(), json!({"id": cloud}));
-    let body = Bytes::from(Value::Object(request).to_string());
-    output.write(answerer.compute(&format!("/v1/{operation}"), body, accept).await?).await
+    last
+}
+
+async fn answer_cloud(
+    answerer: &Answerer,
+    task: Task,
+    files: &Files,
+    request: &CloudRequest,
+) -> Result<(), Failure> {
+    let Task { input, output, format } = task;
+    let (name, place) = (shown(&input), output.name());
+    let refused = |reason: String| Failure::Argument(format!("{name}: {reason}"));
+    let (path, from) = (input.clone(), files.from.clone());
+    let (cloud, body) = on_thread(move || cloud_in(&path, from.as_deref())).await?;
+    let mut warnings: Vec<String> = cloud.left_out().into_iter().collect();
+    let id = answerer.register(tensors::MEDIA_TYPE, body).await?;
+    let path = format!("/v1/{}", request.operation);
+    let found = answerer.compute(&path, request.about(&id).into(), format.asked_for()).await?;
+    let answer =
+        Answer::of(found).map_err(|error| Failure::File(format!("the answer cannot be read: {error}")))?;
+    warnings.extend(report::warnings(&answer));
+    let success = report::success(&answer, &place);
+    let bytes = on_thread(move || Ok(format.write(answer, &cloud))).await?.map_err(refused)?;
+    output.write(bytes.into()).await?;
+    if !files.manners.quiet {
+        warnings.iter().for_each(|warning| tell(&format!("{name}: {warning}")));
+        eprintln!("{success}");
+    }
+    Ok(())
+}
+
+async fn answer_request(ask: Ask, config: Config) -> Result<(), Failure> {
+    let Ask { operation, request, output, manners } = ask;
+    let inputs = [request];
+    let asked = Asked {
+        inputs: &inputs,
+        output: Some(output.as_deref().unwrap_or(Path::new("-"))),
+        to: output.as_deref().is_none_or(is_standard).then_some("json"),
+        content: Content::Answer,
+        suffix: "answer",
+        is_forced: manners.force,
+    };
+    for Task { input, output, format } in asked.tasks()? {
+        let (name, place) = (shown(&input), output.name());
+        let is_file = !matches!(output, output::Output::Standard);
+        let body = on_thread(move || bytes_in(&input)).await?;
+        let answerer = Answerer::start(config.clone(), manners.quiet).await?;
+        let found = answerer.compute(&format!("/v1/{operation}"), body, format.media_type()).await;
+        let found = found.map_err(|failure| {
+            failure.in_words(|problem| {
+                if problem["type"] == "/problems/not-found" {
+                    let names = http::operations().join(", ");
+                    return format!("there is no operation {operation}. There are {names}");
+                }
+                format!("{name}: {}", words::of_request_problem(problem))
+            })
+        })?;
+        let n_bytes = words::counted(found.len(), "byte");
+        output.write(found).await?;
+        if is_file && !manners.quiet {
+            eprintln!("{n_bytes}, wrote {place}");
+        }
+    }
+    Ok(())
 }
 
 /// Works with files on a thread of its own, so that signals are heard while a pipe has nothing to say.
@@ -148,31 +187,14 @@ async fn on_thread<T: Send + 'static>(
     done.map_err(|error| Failure::File(format!("a thread broke off: {error}")))?
 }
 
-/// The tensors of a cloud in a file.
-fn cloud_in(path: &Path) -> Result<Bytes, Failure> {
-    let refused = |detail: String| Failure::File(format!("{}: {detail}", path.display()));
-    let cloud = read::read(&path.to_string_lossy(), &bytes_in(path)?);
-    let cloud = cloud.map_err(|error| refused(error.to_string()))?;
-    if let Some(sentence) = cloud.left_out() {
-        eprintln!("gramian: {}: {sentence}", path.display());
-    }
-    tensors::of(&cloud).map(Bytes::from).map_err(refused)
-}
-
-fn ending(path: &Path) -> String {
-    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
-}
-
-fn media_type_of(path: &Path) -> Result<&'static str, Failure> {
-    let ending = ending(path);
-    let known = ANSWERS.iter().find(|(name, _)| *name == ending);
-    known.map(|(_, media_type)| *media_type).ok_or_else(|| {
-        let names = ANSWERS.map(|(name, _)| format!(".{name}")).join(", ");
-        Failure::Argument(format!("{}: the file of an answer ends with one of {names}", path.display()))
-    })
-}
-
-fn bytes_in(path: &Path) -> Result<Bytes, Failure> {
-    let found = std::fs::read(path);
-    found.map(Bytes::from).map_err(|error| Failure::File(format!("{}: {error}", path.display())))
+/// The cloud in a file, and the body that registers it. `from` is the ending of its format where it is given.
+fn cloud_in(path: &Path, from: Option<&str>) -> Result<(FileCloud, Bytes), Failure> {
+    let refused = |detail: String| Failure::File(format!("{}: {detail}", shown(path)));
+    let name = match from {
+        Some(ending) => format!("cloud.{}", ending.trim_start_matches('.')),
+        None => path.to_string_lossy().into_owned(),
+    };
+    let cloud = read::read(&name, &bytes_in(path)?).map_err(|error| refused(error.to_string()))?;
+    let body = tensors::of(&cloud).map_err(refused)?;
+    Ok((cloud, body.into()))
 }

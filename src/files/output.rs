@@ -11,11 +11,14 @@ use std::path::{Path, PathBuf};
 use axum::body::Bytes;
 use tempfile::NamedTempFile;
 
+use super::failure::Failure;
 use super::on_thread;
-use super::router::Failure;
 
 /// Links that are followed from the name of a file, as many as Linux follows.
 const MAX_LINKS: usize = 40;
+
+/// Name of standard output in messages.
+const STANDARD: &str = "standard output";
 
 /// Permissions of a new file, without those that the umask takes away.
 const NEW_FILE: u32 = 0o666;
@@ -27,18 +30,21 @@ pub enum Output {
     Stream(PathBuf),
     /// A file, which is replaced by the one beside it.
     File {
+        /// The path as it was given.
+        named: PathBuf,
+        /// The file behind its links.
         path: PathBuf,
         beside: NamedTempFile,
     },
 }
 
 impl Output {
-    /// Makes sure that an answer can be written, before it is computed. Standard output if there is no path.
+    /// Makes sure that an answer can be written, before it is computed.
     ///
     /// # Errors
-    /// Refuses the file that is read, folders, and what the operating system does not let be written.
-    pub fn prepare(path: Option<&Path>, input: &Path) -> Result<Self, Failure> {
-        let Some(path) = path else { return Ok(Self::Standard) };
+    /// Refuses files that are read, unless it is forced to replace them, folders, and what the operating
+    /// system does not let be written.
+    pub fn prepare(path: &Path, inputs: &[PathBuf], is_forced: bool) -> Result<Self, Failure> {
         let failed = |error: io::Error| failure(path, &error);
         let older = match fs::metadata(path) {
             Ok(older) => Some(older),
@@ -46,9 +52,9 @@ impl Output {
             Err(error) => return Err(failed(error)),
         };
         if let Some(older) = &older {
-            if is_same_file(older, input) {
-                let detail = format!("{}: the answer would replace the file that is read", path.display());
-                return Err(Failure::Argument(detail));
+            if !is_forced && inputs.iter().any(|input| is_same_file(older, input)) {
+                let detail = "the answer would replace the file that is read; --force lets it";
+                return Err(Failure::Argument(format!("{}: {detail}", path.display())));
             }
             if older.is_dir() {
                 return Err(failed(io::ErrorKind::IsADirectory.into()));
@@ -59,13 +65,26 @@ impl Output {
             // A file that must not be written must not be replaced either.
             OpenOptions::new().write(true).open(path).map_err(failed)?;
         }
+        let named = path.to_owned();
         let path = followed(path).map_err(failed)?;
         let beside = file_beside(&path, older.as_ref());
         let beside = beside.map_err(|error| {
-            let reason = format!("nothing can be written in its folder: {}", error.kind());
+            let reason = match error.kind() {
+                io::ErrorKind::NotFound => "there is no such folder".to_owned(),
+                kind => format!("nothing can be written in its folder: {kind}"),
+            };
             Failure::File(format!("{}: {reason}", path.display()))
         })?;
-        Ok(Self::File { path, beside })
+        Ok(Self::File { named, path, beside })
+    }
+
+    /// The name of the place for messages.
+    pub fn name(&self) -> String {
+        match self {
+            Self::Standard => STANDARD.to_owned(),
+            Self::Stream(path) => path.display().to_string(),
+            Self::File { named, .. } => named.display().to_string(),
+        }
     }
 
     /// Writes an answer. If this is dropped before it is done, an older file is as it was.
@@ -78,7 +97,7 @@ impl Output {
             Self::Stream(path) => {
                 on_thread(move || fs::write(&path, bytes).map_err(|error| failure(&path, &error))).await
             }
-            Self::File { path, beside } => {
+            Self::File { path, beside, .. } => {
                 let (mut file, beside) = beside.into_parts();
                 let named = path.clone();
                 on_thread(move || {
@@ -92,11 +111,12 @@ impl Output {
     }
 }
 
-/// Writes an answer and the end of its line.
+/// Writes an answer, and the end of its line if it is JSON.
 fn standard(bytes: &[u8]) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
-    let written = out.write_all(bytes).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush());
-    written.map_err(|error| failure(Path::new("standard output"), &error))
+    let end: &[u8] = if bytes.starts_with(b"{") { b"\n" } else { b"" };
+    let written = out.write_all(bytes).and_then(|()| out.write_all(end)).and_then(|()| out.flush());
+    written.map_err(|error| failure(Path::new(STANDARD), &error))
 }
 
 fn failure(path: &Path, error: &io::Error) -> Failure {

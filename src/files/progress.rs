@@ -8,14 +8,14 @@ use serde_json::Value;
 
 const WIDTH: usize = 30;
 
-/// A line on standard error, if that is a terminal. It is taken away when dropped.
+/// A line on standard error, if that is a terminal and nobody asked for quiet. It is taken away when dropped.
 pub struct Progress {
     is_shown: bool,
 }
 
 impl Progress {
-    pub fn new() -> Self {
-        Self { is_shown: stderr().is_terminal() }
+    pub fn new(is_quiet: bool) -> Self {
+        Self { is_shown: !is_quiet && stderr().is_terminal() }
     }
 
     /// Shows the `progress` of a job.

@@ -1,6 +1,5 @@
 //! The service in this process: requests go to its router.
 
-use std::fmt;
 use std::time::Duration;
 
 use axum::Router;
@@ -8,10 +7,10 @@ use axum::body::{Body, Bytes, to_bytes};
 use axum::http::{HeaderName, Method, Request, StatusCode, header};
 use axum::response::Response;
 use serde_json::Value;
-use tokio::signal::unix::SignalKind;
 use tower::ServiceExt;
 
 use super::JSON;
+use super::failure::Failure;
 use super::progress::Progress;
 use crate::config::Config;
 use crate::http;
@@ -21,61 +20,22 @@ use gramian_host::state::settings::Settings;
 /// Time between two looks at a computation.
 const LOOKING: Duration = Duration::from_millis(100);
 
-/// The reason why there is no answer.
-#[derive(Debug)]
-pub enum Failure {
-    /// An argument is not as it should be.
-    Argument(String),
-    /// A file cannot be read or written.
-    File(String),
-    /// A signal told the process to end.
-    Ended(SignalKind),
-    /// The service refused the request, or failed, with the problem document.
-    Problem(StatusCode, Value),
-}
-
-impl Failure {
-    pub fn exit_code(&self) -> u8 {
-        match self {
-            Self::File(_) => 1,
-            Self::Argument(_) => 2,
-            // Shells report 128 plus the number of the signal.
-            Self::Ended(signal) => 128 + signal.as_raw_value() as u8,
-            Self::Problem(status, _) if status.is_client_error() => 3,
-            Self::Problem(..) => 4,
-        }
-    }
-}
-
-impl fmt::Display for Failure {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Argument(detail) | Self::File(detail) => formatter.write_str(detail),
-            Self::Ended(signal) => write!(formatter, "ended by signal {}", signal.as_raw_value()),
-            Self::Problem(status, problem) => {
-                let text = |member: &str| problem[member].as_str().unwrap_or_default();
-                let place = problem["errors"][0]["pointer"].as_str().map(|at| format!(" (at {at})"));
-                let (title, detail) = (text("title"), text("detail"));
-                write!(formatter, "{title}{}: {detail} [{status}]", place.unwrap_or_default())
-            }
-        }
-    }
-}
-
 /// A service that answers this process alone.
 pub struct Answerer {
     router: Router,
+    /// Whether no progress is shown.
+    is_quiet: bool,
 }
 
 impl Answerer {
     /// Starts it, without keys and without a store: nobody else can ask, and nothing is kept.
-    pub async fn start(config: Config) -> Result<Self, Failure> {
+    pub async fn start(config: Config, is_quiet: bool) -> Result<Self, Failure> {
         let host = Settings { api_keys: Vec::new(), keys_file: None, store: None, ..config.host };
         let config = Config { host, ..config };
         let app = App::new(config).await;
         let app = app.map_err(|error| Failure::File(format!("the service does not start: {error}")))?;
         let (router, _) = http::router(app);
-        Ok(Self { router })
+        Ok(Self { router, is_quiet })
     }
 
     /// Registers a cloud. Returns its id.
@@ -102,7 +62,7 @@ impl Answerer {
     }
 
     async fn wait_for(&self, job: &str) -> Result<(), Failure> {
-        let mut progress = Progress::new();
+        let mut progress = Progress::new(self.is_quiet);
         loop {
             let found = self.ask(Method::GET, job, &[(header::ACCEPT, JSON)], Bytes::new()).await?;
             let state = json_of(found).await?;

@@ -29,6 +29,7 @@ use gramian_host::state::settings::Origins;
 use openapi::version_3_0;
 use routes::pages::{documentation, viewer};
 pub use routes::reading;
+pub use routes::surface::level_set::VertexSupport;
 use routes::surface::{curvatures, laplace_beltrami, level_set, normals, surface_gradient};
 use routes::tiles::{coarse, regions, sides};
 use routes::values::{interpolation, model_selection, posterior};
@@ -77,6 +78,12 @@ pub fn router(app: Arc<App>) -> (Router, Runner) {
         .layer(from_fn_with_state(app.host.clone(), middleware::name_and_log))
         .with_state(app);
     (router, runner)
+}
+
+/// The paths under `/v1` that answer requests with a body, without that beginning.
+pub fn operations() -> Vec<String> {
+    let paths = parts().document.paths.paths.into_iter().filter(|(_, item)| item.post.is_some());
+    paths.filter_map(|(path, _)| path.strip_prefix("/v1/").map(str::to_owned)).collect()
 }
 
 /// Returns a route that serves a document.

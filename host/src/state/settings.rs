@@ -347,7 +347,9 @@ mod tests {
 
     #[test]
     fn sizes_have_units_and_localhost_is_an_address() {
-        let body = |text: &str| settings(&["--max-body-bytes", text]).map(|settings| settings.max_body_bytes);
+        let body = |text: &str| {
+            settings(&[&format!("--max-body-bytes={text}")]).map(|settings| settings.max_body_bytes)
+        };
         for (text, expected) in
             [("4G", 4 << 30), ("512MiB", 512 << 20), ("1.5k", 1536), ("2 GB", 2 << 30), ("17", 17)]
         {
@@ -356,7 +358,8 @@ mod tests {
         for bad in ["", " ", "0", "-1", "4 apples", "1e30", "9999P"] {
             assert!(body(bad).unwrap_err().contains("such as 512MiB or 4G"), "{bad:?}");
         }
-        let bind = |text: &str| settings(&["--bind", text]).map(|settings| settings.bind.to_string());
+        let bind =
+            |text: &str| settings(&[&format!("--bind={text}")]).map(|settings| settings.bind.to_string());
         assert_eq!(bind("localhost:9000").as_deref(), Ok("127.0.0.1:9000"));
         for bad in ["localhost", "8080", ":8080", "example.org:80", "localhost:99999"] {
             assert!(bind(bad).unwrap_err().contains("localhost:8080"), "{bad:?}");

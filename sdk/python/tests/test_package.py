@@ -438,17 +438,33 @@ def test_a_file_is_a_cloud(client: gramian.Client, tmp_path: Path) -> None:
     path.write_bytes(file)
     expected = client.cloud(points, normals=points)
     paths: list[Path | str] = [path, str(path)]
-    for cloud in [client.cloud(file), *map(client.cloud, paths)]:
-        assert (cloud.id, cloud.n_points, cloud.points) == (expected.id, 3, None)
+    for cloud in map(client.cloud, paths):
+        assert cloud.id == expected.id
+        np.testing.assert_array_equal(cloud.points, points)
     cloud = client.cloud(file)
+    assert (cloud.id, cloud.n_points, cloud.points) == (expected.id, 3, None)
     forget(cloud)
     np.testing.assert_array_equal(cloud.normals().normals, expected.normals().normals)
-    with pytest.raises(TypeError, match="a PLY file has its own"):
+    with pytest.raises(TypeError, match="a file has its own"):
         client.cloud(path, normals=points)
     with pytest.raises(gramian.Problem, match="at most 0 fit"):
         client.cloud(head.encode())
     with pytest.raises(FileNotFoundError):
         client.cloud("nowhere.ply")
+
+
+def test_what_is_left_out_of_a_file_is_said(client: gramian.Client, tmp_path: Path) -> None:
+    fields = ["FIELDS x y z", "SIZE 4 4 4", "TYPE F F F", "WIDTH 2", "HEIGHT 1", "DATA ascii"]
+    path = tmp_path / "scan.pcd"
+    path.write_text("\n".join(["VERSION 0.7", *fields, "nan nan nan", "1 2 3", ""]))
+    with pytest.warns(UserWarning, match="left out without a position: 1 of 2 points") as warned:
+        cloud = client.cloud(path)
+    assert warned[0].filename == __file__
+    np.testing.assert_array_equal(cloud.points, [[1.0, 2.0, 3.0]])
+    path = tmp_path / "scan.xyz"
+    path.write_text("1 2 3\n4 5\n")
+    with pytest.raises(ValueError, match="line 2 has 2 cells"):
+        client.cloud(path)
 
 
 def test_the_cloud_of_a_geometry_is_posted_again(client: gramian.Client, circle: Array) -> None:

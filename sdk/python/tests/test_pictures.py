@@ -101,6 +101,60 @@ def test_posteriors_and_likelihoods_are_lines() -> None:
     assert isinstance(line.select_model(values, families="gauss").plot(), LikelihoodDisplay)
 
 
+def test_pictures_of_a_line_have_data_units_and_a_band() -> None:
+    x = np.linspace(0, 6, 20)
+    values = np.sin(x)
+    line = gramian.Client().cloud(x[:, None])
+    at = np.linspace(0, 6, 50)[:, None]
+    posterior = line.posterior(values, at, include="variances", samples=3, kernel="gauss", alpha=1e-4)
+    axes = posterior.plot(length_unit="mm", value_unit="K").axes_
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x, mm", "means, K")
+    drawn = {each.get_label(): each for each in axes.lines}
+    np.testing.assert_array_equal(drawn["data"].get_xydata(), np.column_stack([x, values]))
+    assert len(axes.lines) == 5  # the mean, the data and three samples
+    assert "95 %" in [text.get_text() for text in axes.get_legend().get_texts()]
+    slope = line.interpolate(values, at, derivatives=1, kernel="gauss").plot("gradients", value_unit="K").axes_
+    assert slope.get_ylabel() == "gradients, K/L"
+    batch = line.interpolate_batch([values, -values], at, kernel="gauss").plot().axes_
+    assert [len(each.get_xdata()) for each in batch.lines] == [50, 20, 50, 20]
+
+
+def test_pictures_of_the_plane_have_the_data_and_names_of_axes() -> None:
+    points = np.random.default_rng(0).uniform(size=(40, 2))
+    square = gramian.Client().cloud(points)
+    posterior = square.posterior(points[:, 0], points[:9] + 0.01, include="variances", kernel="gauss", alpha=1e-4)
+    display = posterior.plot(length_unit="mm", value_unit="K")
+    assert (display.axes_.get_xlabel(), display.axes_.get_ylabel()) == ("x, mm", "y, mm")
+    assert display.figure_.axes[1].get_ylabel() == "K (grey where uncertain)"
+    np.testing.assert_array_equal(display.axes_.collections[-1].get_offsets(), points)
+    along = posterior.plot(places=np.arange(9.0)).axes_
+    assert along.get_xlabel() == "way along the queries, L"
+
+
+def test_pictures_of_space_have_directions_and_a_length(cloud: Any, mesh: gramian.Mesh) -> None:
+    for answer in (cloud.curvatures(), mesh, cloud.laplace_beltrami(cloud.points[:, 2])):
+        axes = answer.plot(length_unit="mm").axes_
+        assert [text.get_text() for text in axes.texts] == ["x", "y", "z", "0.2 mm"]
+    assert mesh.plot("principal_curvatures", length_unit="mm").figure_.axes[1].get_ylabel().startswith("1/mm")
+
+
+def test_a_likelihood_is_shown_where_it_matters() -> None:
+    x = np.linspace(0, 6, 40)
+    values = np.sin(x) + 0.1 * np.random.default_rng(0).normal(size=40)
+    found = gramian.Client().cloud(x[:, None]).select_model(values, kernel="gauss", alpha=0.01, restarts=0)
+    axes = found.plot(value_unit="K").axes_
+    assert axes.get_xlabel() == "α, variance of the noise, K²"
+    assert axes.get_ylabel() == "log marginal likelihood"
+    low, high = axes.get_ylim()
+    assert high - low < 35
+    assert low < found.score < high
+    left, right = axes.get_xlim()
+    assert left < found.alpha < right
+    assert found.criterion is gramian.SelectionCriterion.MARGINAL_LIKELIHOOD
+    assert found.leave_one_out.plot().axes_.get_ylabel() == "means, V"
+    assert found.alpha_path.plot().axes_.get_ylabel() == "score"
+
+
 def test_positions_that_are_not_known_are_asked_for(tmp_path: Path) -> None:
     path = tmp_path / "sphere.ply"
     head = (

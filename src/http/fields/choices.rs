@@ -6,8 +6,9 @@ use utoipa::ToSchema;
 use gramian_numerics::regression::solver::trend::Mean;
 
 /// The method that solves the linear system.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
+#[value(rename_all = "snake_case")]
 pub enum SolverChoice {
     /// The service chooses.
     #[default]
@@ -26,8 +27,9 @@ pub enum SolverChoice {
 }
 
 /// The treatment of points that coincide when alpha is 0.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
+#[value(rename_all = "snake_case")]
 pub enum DuplicatePolicy {
     /// Answer 422 `duplicate-points`.
     #[default]
@@ -59,8 +61,9 @@ impl From<MeanChoice> for Mean {
 }
 
 /// The function whose level set is the surface.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
+#[value(rename_all = "snake_case")]
 pub enum SurfaceModelChoice {
     /// `signature`, replaced by `offset` where its gradient vanishes or, for curvatures, is weak.
     #[default]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import os
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from pathlib import Path
 from types import TracebackType
 from typing import Any, NoReturn, Self, SupportsFloat, TypeVar, cast
 
@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from . import rest
 from .arguments.arrays import Sizes
+from .arguments.files import read
 from .arguments.fit import Whole
 from .arguments.geometries import GeometryLike, geometry_of
 from .arguments.keywords import suggest_names
@@ -156,11 +157,12 @@ class Client:
         Parameters
         ----------
         points : array_like, `[n, d]`, or str, os.PathLike or bytes
-            A row of coordinates for each point, also on a line: `[[0.0], [0.5]]`. Or a PLY file, as scanners
-            write it: a path that ends in `.ply`, or the bytes. Its vertices are the points, with their
-            normals. The service reads the file, so that the cloud has no `points` here. Arrays of other
-            libraries are read through `__array__`. Or a mesh or a cloud of trimesh, PyVista or Open3D: its
-            vertices are the points, with its normals if each vertex has one.
+            A row of coordinates for each point, also on a line: `[[0.0], [0.5]]`. Or the path of a file: PLY,
+            XYZ, CSV, PCD, LAS, npy, OBJ, STL or JSON, with its normals. Points of organised scans without a
+            position are left out, with a warning. Or the bytes of a PLY file, which the service reads, so that
+            the cloud has no `points` here. Arrays of other libraries are read through `__array__`. Or a mesh or
+            a cloud of trimesh, PyVista or Open3D: its vertices are the points, with its normals if each vertex
+            has one.
         normals : array_like, `[n, d]`, optional
             Normals of any length but 0, if known. Their side is the outward one. They replace those of a mesh.
             Not allowed with a file, which has normals itself.
@@ -177,11 +179,12 @@ class Client:
         """
         if columns is not None:
             points = columns_of(points, columns)
-        file = _ply_file(points)
-        if file is not None:
-            if normals is not None:
-                raise TypeError("normals are given with points: a PLY file has its own, as nx, ny and nz")
-            return Cloud(self._connection, register_file(self._connection, file), file=file)
+        if isinstance(points, str | os.PathLike | bytes) and normals is not None:
+            raise TypeError("normals are given with points: a file has its own, such as nx, ny and nz")
+        if isinstance(points, bytes) and points.startswith(b"ply"):
+            return Cloud(self._connection, register_file(self._connection, points), file=points)
+        if isinstance(points, str | os.PathLike):
+            points, normals = _of_file(points)
         geometry = geometry_of(points)
         if geometry is not None:
             points, normals = geometry.positions, geometry.normals if normals is None else normals
@@ -235,13 +238,12 @@ class Client:
         return self._connection.read(kind.from_dict, self._connection.send("GET", path, params=parameters))
 
 
-def _ply_file(points: object) -> bytes | None:
-    """Returns the bytes of a PLY file, given by path or as bytes. None if the points are something else."""
-    if isinstance(points, bytes):
-        return points if points.startswith(b"ply") else None
-    if isinstance(points, str | os.PathLike) and str(points).lower().endswith(".ply"):
-        return Path(points).read_bytes()
-    return None
+def _of_file(path: str | os.PathLike[str]) -> tuple[Array, Array | None]:
+    """Returns the positions of a file, and its normals if it has some. Warns of rows that are left out."""
+    found = read(path)
+    if found.left_out is not None:
+        warnings.warn(f"{os.fspath(path)}: {found.left_out}", stacklevel=4)  # beyond the decorator of the class
+    return found.positions, found.normals
 
 
 def _own_array(name: str, rows: npt.ArrayLike, sizes: Sizes | None = None) -> Array:

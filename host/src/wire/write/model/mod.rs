@@ -49,21 +49,26 @@ impl Shape {
 const QUALITIES: [&str; 5] = ["mean_curvature", "position_std", "normal_std", "residual", "level"];
 
 /// A number at each vertex.
-pub(super) struct Property<'a> {
+pub struct Property<'a> {
     /// The name in files: singular, with an index for each component.
-    name: String,
+    pub name: String,
     array: &'a Array,
     component: usize,
 }
 
 impl Property<'_> {
+    /// The number at a vertex, NaN where there is none.
+    pub fn number(&self, vertex: usize) -> f64 {
+        self.array.row_entry(vertex, self.component)
+    }
+
     fn at(&self, vertex: usize) -> f32 {
-        self.array.row_entry(vertex, self.component) as f32
+        self.number(vertex) as f32
     }
 }
 
 /// A shape with what the answer says at its vertices.
-pub(super) struct Model<'a> {
+pub struct Model<'a> {
     shape: &'a Shape,
     /// Unit normals, `[k, d]`.
     normals: Option<&'a Array>,
@@ -72,7 +77,7 @@ pub(super) struct Model<'a> {
 
 impl<'a> Model<'a> {
     /// Takes the arrays with a row for each vertex.
-    pub(super) fn of(shape: &'a Shape, arrays: impl Iterator<Item = (&'static str, &'a Array)>) -> Self {
+    pub fn of(shape: &'a Shape, arrays: impl Iterator<Item = (&'a str, &'a Array)>) -> Self {
         let n = shape.positions.n_points();
         let mut model = Self { shape, normals: None, properties: Vec::new() };
         for (name, array) in arrays.filter(|(name, array)| array.shape()[0] == n && *name != "vertices") {
@@ -94,8 +99,8 @@ impl<'a> Model<'a> {
         model
     }
 
-    /// The bytes of a file.
-    pub(super) fn write(&self, format: Format) -> Option<Vec<u8>> {
+    /// The bytes of a file. `None` for other formats than those of models.
+    pub fn write(&self, format: Format) -> Option<Vec<u8>> {
         match format {
             Format::Ply => Some(ply::write(self)),
             Format::Gltf => gltf::write(self),
@@ -104,7 +109,7 @@ impl<'a> Model<'a> {
         }
     }
 
-    fn n_vertices(&self) -> usize {
+    pub fn n_vertices(&self) -> usize {
         self.shape.positions.n_points()
     }
 
@@ -113,10 +118,16 @@ impl<'a> Model<'a> {
         [row[0], row[1], row.get(2).copied().unwrap_or(0.0)]
     }
 
-    fn normal(&self, vertex: usize) -> Option<[f64; 3]> {
+    /// The unit normal at a vertex, in space.
+    pub fn normal(&self, vertex: usize) -> Option<[f64; 3]> {
         let (normals, d) = (self.normals?, self.shape.positions.dimension());
         let row: Vec<f64> = (0..d).map(|axis| normals.row_entry(vertex, axis)).collect();
         Some(Self::in_space(&row))
+    }
+
+    /// Numbers at the vertices beside positions and normals.
+    pub fn properties(&self) -> &[Property<'a>] {
+        &self.properties
     }
 
     fn cells(&self) -> impl ExactSizeIterator<Item = &[u32]> {
@@ -124,7 +135,7 @@ impl<'a> Model<'a> {
     }
 
     /// The property that programs colour by.
-    fn quality(&self) -> Option<&Property<'a>> {
+    pub fn quality(&self) -> Option<&Property<'a>> {
         QUALITIES.iter().find_map(|name| self.properties.iter().find(|property| property.name == *name))
     }
 }

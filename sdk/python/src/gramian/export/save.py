@@ -61,7 +61,7 @@ def npz_of(answer: Any, arrays: dict[str, Any]) -> bytes:  # noqa: ANN401 (an An
         **({"diagnostics": json.dumps(answer.diagnostics.to_dict())} if hasattr(answer, "diagnostics") else {}),
     }
     file = io.BytesIO()
-    np.savez_compressed(file, **content)
+    np.savez(file, **content)
     return file.getvalue()
 
 

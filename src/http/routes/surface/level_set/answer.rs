@@ -227,7 +227,7 @@ fn answer(
         normals.iter_mut().for_each(|c| *c = -*c);
         cells.chunks_exact_mut(d).for_each(|cell| cell.swap(0, 1));
     }
-    let codes = support.iter().map(|support| *support as u8).collect();
+    let codes = support.iter().map(|support| VertexSupport::from(*support).code()).collect();
     let shape = Shape {
         positions: Arc::new(Vertices(meshed.vertices)),
         cells: cells.clone(),

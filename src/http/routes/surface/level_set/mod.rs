@@ -87,7 +87,7 @@ request! {
 }
 
 /// Support of a vertex by the points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum VertexSupport {
     /// There are points within two spacings.
@@ -96,6 +96,13 @@ pub enum VertexSupport {
     Bridged,
     /// The surface goes on beyond the points, or more than eight spacings from them.
     Extrapolated,
+}
+
+impl VertexSupport {
+    /// The number that stands for it in files of models.
+    pub fn code(self) -> u8 {
+        self as u8
+    }
 }
 
 /// A connected part of a mesh.
