@@ -130,7 +130,9 @@ export class Body {
     geometry.setAttribute("normal", new BufferAttribute(new Float32Array(3 * n), 3));
     geometry.setAttribute("value", new BufferAttribute(new Float32Array(n), 1));
     geometry.setAttribute("deviation", new BufferAttribute(new Float32Array(n), 1));
-    geometry.setAttribute("spacing", new BufferAttribute(cells ? new Float32Array(n).fill(spacing) : spacings, 1));
+    // Dots on a curve show where its points are, and need not cover it.
+    const isEven = cells || dimension === 2;
+    geometry.setAttribute("spacing", new BufferAttribute(isEven ? new Float32Array(n).fill(spacing) : spacings, 1));
     geometry.setAttribute("paint", new BufferAttribute(new Uint8Array(3 * n), 3, true));
     this.geometry = geometry;
     this.material = quantityMaterial(!this.isMesh);
