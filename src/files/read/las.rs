@@ -20,7 +20,9 @@ const FIRST_OF_1_4: u8 = 6;
 pub fn read(bytes: &[u8]) -> Result<FileCloud, String> {
     let header = Header::parse(bytes)?;
     if header.is_compressed {
-        return Err("the file is LAZ".to_owned());
+        return Err(
+            "LAZ is not read: convert it with las2las -i scan.laz -o scan.las, or with PDAL".to_owned()
+        );
     }
     let points = bytes.get(header.points_begin..).unwrap_or_default();
     let records = Records { bytes: points, count: header.n_points, width: header.width, name: "point" };
