@@ -1,6 +1,6 @@
 // @ts-check
-// The way of somebody who brings a scan to the page and has read docs/page.md alone: each control is found by a
-// name that the document has.
+// The way of somebody who brings a scan to the page and has read docs/page.md alone: each control is found by
+// a name that the document has.
 
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
