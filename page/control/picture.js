@@ -12,7 +12,10 @@ import { chosen, isPositive, rangeNow } from "./range.js";
 
 /** @import { Answer, ColourRange, Quantity, Settings } from "../types.d.ts" */
 
-/** Settings whose change leaves the numbers in the buffers as they are. */
+/** Settings on which the numbers in the buffers depend. */
+const NUMBER_SETTINGS = ["quantity", "colour", "logarithmic"];
+
+/** Settings of how these numbers become colours. */
 const RANGE_SETTINGS = ["range", "low", "high", "centre", "map", "hide", "suppress", "isolines"];
 
 /** The part of the points with a side beyond which those that look away are hidden. */
@@ -96,19 +99,19 @@ export async function showPicture(changed = {}) {
 }
 
 /**
+ * Fills buffers where the numbers in them have changed, and otherwise changes the range alone.
+ *
  * @param {Quantity | undefined} quantity
  * @param {ColourRange} range
- * @param {string[]} changed
+ * @param {string[]} changed names of settings. None: the answer is new
  */
 async function showColours(quantity, range, changed) {
-  const { settings, answer } = page;
-  const isRange = changed.length > 0 && changed.every((name) => RANGE_SETTINGS.includes(name));
-  if (settings.colour === "support" && answer?.fields.support) await colourBySupport(answer.fields.support);
+  const support = page.settings.colour === "support" ? page.answer?.fields.support : undefined;
+  if (changed.length > 0 && !changed.some((name) => NUMBER_SETTINGS.includes(name))) {
+    if (!support && changed.some((name) => RANGE_SETTINGS.includes(name))) scene.range(range, !quantity);
+  } else if (support) await colourBySupport(support);
   else if (quantity?.channels) await scene.paint(quantity.channels, range);
-  else if (isRange) scene.range(range, !quantity);
-  else if (changed.length === 0 || changed.some((name) => ["quantity", "colour", "logarithmic"].includes(name))) {
-    await scene.colour(quantity, range);
-  }
+  else await scene.colour(quantity, range);
 }
 
 /**
