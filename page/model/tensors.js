@@ -70,9 +70,14 @@ export function decode(buffer) {
   const tensors = {};
   for (const [name, { dtype, shape, data_offsets: place }] of Object.entries(described)) {
     const [start, end] = place;
-    const bytes = buffer.slice(8 + length + start, 8 + length + end);
+    const from = 8 + length + start;
+    // Numbers at multiples of eight bytes are read where they are.
+    const [bytes, first] = from % 8 === 0 ? [buffer, from] : [buffer.slice(from, from + end - start), 0];
     // Whole numbers here are indices, far below 2³².
-    const data = dtype === "I64" ? lowHalves(new Uint32Array(bytes)) : new Float64Array(bytes);
+    const data =
+      dtype === "I64"
+        ? lowHalves(new Uint32Array(bytes, first, (end - start) / 4))
+        : new Float64Array(bytes, first, (end - start) / 8);
     tensors[name] = new Tensor(data, shape);
   }
   return { tensors, fields: JSON.parse(metadata.response) };
