@@ -138,7 +138,7 @@ export const PROBLEMS = {
         return "The points do not enclose a volume: inside and outside cannot be told apart. If the surface ends where its points end, say so.";
       }
       if (pointerOf(problem) === "/step" && context.settings.step > 0) {
-        return "With this step no surface was found: it is longer than the shape, or it is no length.";
+        return "With this step no surface was found. The step may be longer than the shape.";
       }
       return control
         ? `“${control}” has a value that the service does not take. ${placeOf(problem)}`.trim()
@@ -193,16 +193,16 @@ export const PROBLEMS = {
   },
   unauthorized: {
     title: "The service needs a key",
-    text: () => "Enter it in the field “Key of the service”. What you asked is then asked again.",
+    text: () => "Enter it in the field “Key of the service”. The page then repeats the request.",
   },
   "rate-limited": {
-    title: "Too many questions at once",
-    text: () => "Your key has a limit of questions a minute. Wait a little, then try again.",
+    title: "Too many requests at once",
+    text: () => "Your key has a limit of requests a minute. Wait a little, then try again.",
     remedies: AGAIN,
   },
   overloaded: {
     title: "The service is busy",
-    text: () => "Others are asking it too. Wait a little, then try again.",
+    text: () => "It is working on other requests. Wait a little, then try again.",
     remedies: AGAIN,
   },
   internal: {

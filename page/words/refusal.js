@@ -51,7 +51,7 @@ function show(title, { remedies, ...words }) {
   showRefusal(at("refusal"), { title, ...words, actions });
 }
 
-/** Opens the field for the key. Once there is one, the question is asked again. */
+/** Opens the field for the key. Once there is one, the request is repeated. */
 function askForKey() {
   const field = at("key");
   at("keyHint").textContent = savedKey()
