@@ -32,12 +32,12 @@ function reasons() {
     high: ofColours,
     low: ofColours,
     map: ofColours,
-    orthographic: isFlat ? "Points in a plane are always shown so." : "",
+    orthographic: isFlat ? "Points in a plane are always in parallel projection." : "",
     range: ofColours,
     sectionAt:
       settings.section === "none" ? "There are no level regions." : isFlat ? "The regions fill the plane." : "",
     suppress: ofBars,
-    up: isFlat ? "Points in a plane have no up." : "",
+    up: isFlat ? "Points in a plane have no upward axis." : "",
   };
 }
 

@@ -74,7 +74,7 @@ export const PROBLEMS = {
     remedies: () => [REMEDIES.merge, REMEDIES.drop],
   },
   "dimension-mismatch": mismatch("Points of different dimensions"),
-  "length-mismatch": mismatch("Points and their numbers do not pair"),
+  "length-mismatch": mismatch("Points and their values or normals differ in number"),
   "kernel-not-smooth": {
     title: "This kernel has no curvature at the points",
     text: () =>
