@@ -93,7 +93,7 @@ pub struct Manners {
     /// Let the answer replace the file that is read.
     #[arg(long)]
     pub force: bool,
-    /// Tell errors alone.
+    /// Print only errors.
     #[arg(short, long)]
     pub quiet: bool,
 }
@@ -139,7 +139,7 @@ fn output_help(content: Content) -> String {
 fn to_help(content: Content) -> String {
     let first = write::FORMATS[0].ending;
     let among = write::endings(content);
-    format!("The format of answers whose names do not tell it: one of {among}. Default: {first}")
+    format!("The format of answers whose file names have no known ending: one of {among}. Default: {first}")
 }
 
 fn ask_output_help() -> String {

@@ -184,7 +184,7 @@ async fn on_thread<T: Send + 'static>(
     work: impl FnOnce() -> Result<T, Failure> + Send + 'static,
 ) -> Result<T, Failure> {
     let done = tokio::task::spawn_blocking(work).await;
-    done.map_err(|error| Failure::File(format!("a thread broke off: {error}")))?
+    done.map_err(|error| Failure::File(format!("a worker thread failed: {error}")))?
 }
 
 /// The cloud in a file, and the body that registers it. `from` is the ending of its format where it is given.

@@ -53,7 +53,7 @@ impl Output {
         };
         if let Some(older) = &older {
             if !is_forced && inputs.iter().any(|input| is_same_file(older, input)) {
-                let detail = "the answer would replace the file that is read; --force lets it";
+                let detail = "the answer would replace the file that is read; give --force to allow it";
                 return Err(Failure::Argument(format!("{}: {detail}", path.display())));
             }
             if older.is_dir() {
@@ -70,7 +70,7 @@ impl Output {
         let beside = file_beside(&path, older.as_ref());
         let beside = beside.map_err(|error| {
             let reason = match error.kind() {
-                io::ErrorKind::NotFound => "there is no such folder".to_owned(),
+                io::ErrorKind::NotFound => "the folder does not exist".to_owned(),
                 kind => format!("nothing can be written in its folder: {kind}"),
             };
             Failure::File(format!("{}: {reason}", path.display()))

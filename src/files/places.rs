@@ -49,7 +49,7 @@ impl Asked<'_> {
                 return Ok(Task { input: input.clone(), output: Output::Standard, format });
             };
             if !taken.insert(path.clone()) {
-                let detail = "two answers would have this name; give each its own folder by -o";
+                let detail = "two answers would have this name; run them separately, each with its own -o";
                 return Err(Failure::Argument(format!("{}: {detail}", path.display())));
             }
             let output = Output::prepare(&path, self.inputs, self.is_forced)?;
@@ -102,7 +102,7 @@ impl Asked<'_> {
         })?;
         if path.is_none() && !format.is_text() && stdout().is_terminal() {
             let detail = "a terminal cannot show it: give -o FILE, or --to csv or json";
-            return Err(Failure::Argument(format!(".{} is no text, {detail}", format.ending)));
+            return Err(Failure::Argument(format!(".{} is a binary format, {detail}", format.ending)));
         }
         Ok(format)
     }

@@ -89,7 +89,7 @@ impl Answerer {
         let request = request
             .header(header::CONTENT_LENGTH, body.len())
             .body(Body::from(body))
-            .map_err(|error| Failure::File(format!("{path} is no path: {error}")))?;
+            .map_err(|error| Failure::File(format!("{path} is not a valid path: {error}")))?;
         let Ok(response) = self.router.clone().oneshot(request).await;
         let status = response.status();
         if status.is_client_error() || status.is_server_error() {
@@ -101,7 +101,7 @@ impl Answerer {
 
 async fn bytes_of(response: Response) -> Result<Bytes, Failure> {
     let found = to_bytes(response.into_body(), usize::MAX).await;
-    found.map_err(|error| Failure::File(format!("the answer broke off: {error}")))
+    found.map_err(|error| Failure::File(format!("the answer was cut short: {error}")))
 }
 
 async fn json_of(response: Response) -> Result<Value, Failure> {

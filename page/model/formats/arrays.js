@@ -96,13 +96,13 @@ function parsed(text) {
   try {
     return JSON.parse(text);
   } catch (error) {
-    throw new Error(`the file is no JSON: ${error instanceof Error ? error.message : error}`);
+    throw new Error(`the file is not JSON: ${error instanceof Error ? error.message : error}`);
   }
 }
 
 function rowsOfJson(member, rows, [n, d]) {
   if (!Array.isArray(rows) || rows.length !== n)
-    throw new Error(`${member} are to have a row for each of the ${n} points`);
+    throw new Error(`${member} must have one row for each of the ${n} points`);
   const data = new Float64Array(n * d);
   rows.forEach((row, at) => {
     data.set(numbersOfJson(`${member}[${at}]`, row, d), at * d);

@@ -43,7 +43,7 @@ export function formatOf(bytes, name) {
   if (promised === "STL" || promised === "OBJ" || promised === "JSON") return promised;
   if (promised === "PLY") throw new Error('the file is not PLY: its first line is not "ply"');
   if (promised && promised !== "XYZ, CSV, TSV")
-    throw new Error(`the file is not ${promised}: it does not begin as such files do`);
+    throw new Error(`the file is not ${promised}: its first bytes are not those of this format`);
   if (["v", "vn", "vt", "o", "g", "mtllib"].includes(word)) return "OBJ";
   if (word === "solid" && head.includes("facet")) return "STL";
   if (/^[{[]/.test(word)) return "JSON";

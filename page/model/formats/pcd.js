@@ -59,7 +59,7 @@ function headerOf(bytes) {
     if (!Object.hasOwn(SCALARS, type)) throw new Error(`the type of ${name}, ${type}, is unknown`);
     const count = word("COUNT", at) ?? "1";
     if (!/^\d+$/.test(count) || !(count >= 1 && count <= MAX_FIELDS))
-      throw new Error(`COUNT of ${name} is no number of numbers`);
+      throw new Error(`COUNT of ${name} is not a count`);
     return { name, scalar: SCALARS[type], count: Number(count), width: SCALARS[type].size * count };
   });
   const number = (entry) => (/^\d+$/.test(word(entry, 0) ?? "") ? Number(word(entry, 0)) : NaN);

@@ -47,7 +47,7 @@ export function ply(bytes) {
   const at = elements.findIndex(({ name }) => name === "vertex");
   if (at < 0) throw new Error("the file has no element vertex");
   const [before, vertices] = [elements.slice(0, at), elements[at]];
-  if (vertices.properties.every(({ length }) => length)) throw new Error("the vertices have no numbers");
+  if (vertices.properties.every(({ length }) => length)) throw new Error("the element vertex has no scalar properties");
   const data = bytes.subarray(body);
   if (format === "ascii") return textVertices(linesFrom(data, nLines), before, vertices);
   const records = new Binary(data, format === "binary_little_endian");

@@ -122,7 +122,7 @@ impl Format {
             (Some(Self::Ply), _) => Err("the file is not PLY: its first line is not \"ply\"".to_owned()),
             (Some(Self::Npy | Self::Las | Self::Pcd), _) => {
                 let name = known.map(|format| format.name).unwrap_or_default();
-                Err(format!("the file is not {name}: it does not begin as such files do"))
+                Err(format!("the file is not {name}: its first bytes are not those of this format"))
             }
             (_, word) if OBJ_WORDS.contains(&word) => Ok(Self::Obj),
             (_, "solid") if head.contains("facet") => Ok(Self::Stl),

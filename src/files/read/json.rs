@@ -7,7 +7,7 @@ use super::{FileCloud, text_of};
 /// Reads points, and normals and values if there are any.
 pub fn read(bytes: &[u8]) -> Result<FileCloud, String> {
     let document: Value =
-        serde_json::from_str(text_of(bytes)?).map_err(|error| format!("the file is no JSON: {error}"))?;
+        serde_json::from_str(text_of(bytes)?).map_err(|error| format!("the file is not JSON: {error}"))?;
     let cloud = document.get("cloud").unwrap_or(&document);
     let points = if cloud.is_array() { Some(cloud) } else { cloud.get("points") };
     let rows = points.and_then(Value::as_array).map(Vec::as_slice).unwrap_or_default();
@@ -19,7 +19,7 @@ pub fn read(bytes: &[u8]) -> Result<FileCloud, String> {
     let normals = member("normals").map(|rows_of_normals| {
         let normals = rows_of_normals.as_array().filter(|normals| normals.len() == rows.len());
         let normals = normals
-            .ok_or_else(|| format!("normals are to have a row for each of the {} points", rows.len()))?;
+            .ok_or_else(|| format!("normals must have one row for each of the {} points", rows.len()))?;
         table("normals", normals, dimension)
     });
     let values = member("values").or_else(|| document.get("values")).filter(|value| !value.is_null());

@@ -83,7 +83,7 @@ impl<'a> Header<'a> {
             let scalar = scalar.ok_or_else(|| format!("the type of {name}, {letter}{size}, is unknown"))?;
             let count = word(entry("COUNT"), at).unwrap_or("1").parse().ok();
             let count = count.filter(|count| (1..=MAX_FIELDS).contains(count));
-            let count = count.ok_or_else(|| format!("COUNT of {name} is no number of numbers"))?;
+            let count = count.ok_or_else(|| format!("COUNT of {name} is not a count"))?;
             Ok(PcdField { name, scalar, count })
         };
         let fields = names.iter().enumerate().map(field).collect::<Result<Vec<_>, String>>()?;

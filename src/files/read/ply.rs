@@ -24,7 +24,7 @@ fn vertices(mut cursor: Cursor<'_>, header: &Header<'_>, element: &Element<'_>) 
     let is_number = |at: &usize| matches!(element.properties[*at].kind, Kind::Number(_));
     let wanted: Vec<usize> = (0..element.properties.len()).filter(is_number).collect();
     if wanted.is_empty() {
-        return Err("the vertices have no numbers".to_owned());
+        return Err("the element vertex has no scalar properties".to_owned());
     }
     let mut column_of = vec![0; element.properties.len()];
     wanted.iter().enumerate().for_each(|(column, &property)| column_of[property] = column);

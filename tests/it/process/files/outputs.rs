@@ -40,7 +40,7 @@ fn what_cannot_be_written_is_told_before_anything_is_read() {
     let folder = Folder::new("unwritable");
     symlink("loop.ply", folder.0.join("loop.ply")).unwrap();
     for (output, part) in [
-        ("no/such/out.ply", "no/such/out.ply: there is no such folder"),
+        ("no/such/out.ply", "no/such/out.ply: the folder does not exist"),
         ("loop.ply", "loop.ply"),
         ("/proc/out.ply", "/proc/out.ply"),
     ] {

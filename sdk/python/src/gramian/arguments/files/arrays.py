@@ -58,13 +58,13 @@ def read_json(content: bytes) -> FileCloud:
     Raises
     ------
     ValueError
-        If the file is no JSON, or has no rows of numbers.
+        If the file is not JSON, or has no rows of numbers.
     """
     text = text_of(content)
     try:
         document = json.loads(text, parse_int=float)
     except (ValueError, RecursionError) as error:
-        raise ValueError(f"the file is no JSON: {error}") from error
+        raise ValueError(f"the file is not JSON: {error}") from error
     cloud = _member(document, "cloud", document)
     points = cloud if isinstance(cloud, list) else _member(cloud, "points")
     d = len(points[0]) if isinstance(points, list) and points and isinstance(points[0], list) else 0
@@ -72,7 +72,7 @@ def read_json(content: bytes) -> FileCloud:
         raise ValueError("the JSON needs points: rows of coordinates")
     normals = _member(cloud, "normals")
     if normals is not None and (not isinstance(normals, list) or len(normals) != len(points)):
-        raise ValueError(f"normals are to have a row for each of the {len(points)} points")
+        raise ValueError(f"normals must have one row for each of the {len(points)} points")
     values = _member(cloud, "values", _member(document, "values"))
     return FileCloud(
         _table("points", points, d),

@@ -51,7 +51,7 @@ def format_of(name: str, content: bytes) -> str:
     if promised == "PLY":
         raise ValueError('the file is not PLY: its first line is not "ply"')
     if promised is not None and promised != "XYZ, CSV, TSV":
-        raise ValueError(f"the file is not {promised}: it does not begin as such files do")
+        raise ValueError(f"the file is not {promised}: its first bytes are not those of this format")
     if word in OBJ_WORDS:
         return "OBJ"
     if word == b"solid" and b"facet" in head:

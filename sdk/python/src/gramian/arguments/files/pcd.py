@@ -132,7 +132,7 @@ def _field(name: str, at: int, entries: dict[str, list[str]]) -> Field:
         raise ValueError(f"the type of {name}, {kind}, is unknown")
     count = _whole(word.get("COUNT", "1"))
     if count is None or not 1 <= count <= MAX_FIELDS:
-        raise ValueError(f"COUNT of {name} is no number of numbers")
+        raise ValueError(f"COUNT of {name} is not a count")
     return Field(name, TYPES[kind], count)
 
 

@@ -88,7 +88,7 @@ def read_ply(content: bytes) -> FileCloud:
     at = names.index("vertex")
     before, vertices = header.elements[:at], header.elements[at]
     if not vertices.numbers:
-        raise ValueError("the vertices have no numbers")
+        raise ValueError("the element vertex has no scalar properties")
     data = content[header.n_bytes :]
     if header.order == "":
         return _text_vertices(lines_of(data, header.n_lines), before, vertices).cloud()
