@@ -1,6 +1,7 @@
 // @ts-check
 // What can be asked about a cloud, and the quantities of the answers.
 
+/** @import { Tensor } from "./tensors.js" */
 /** @import { Answer, Cloud, Quantity, Settings } from "../types.d.ts" */
 
 /** @type {Record<string, { title: string, path: string, method: string }>} */
@@ -81,8 +82,13 @@ export function quantitiesOf(answer, cloud, unit) {
         title: (NAMES[name] ?? name.replaceAll("_", " ")) + index,
         unit: unitOf(name, cloud.points.width).replace("L", unit || "L"),
         isSigned: /curvatures$/.test(name),
-        values: columnOf(tensor, at),
-        deviations: columnOf(answer.tensors[`${name.replace(/s$/, "")}_std`], at),
+        // Columns of a million points are made when they are first looked at.
+        get values() {
+          return columnOf(tensor, at);
+        },
+        get deviations() {
+          return columnOf(answer.tensors[`${name.replace(/s$/, "")}_std`], at);
+        },
       });
     }
   }
@@ -114,12 +120,21 @@ function channelsOf(values) {
   return factor === 1 ? channels : channels.map((channel) => channel.map((x) => factor * x));
 }
 
+/** @type {WeakMap<Tensor, Map<number, ArrayLike<number>>>} */
+const columns = new WeakMap();
+
+/** A column of a tensor, the same array each time. */
 function columnOf(tensor, at) {
   if (!tensor) return undefined;
   if (tensor.width === 1) return tensor.data;
-  const column = new Float64Array(tensor.rows);
-  for (let row = 0; row < tensor.rows; row++) column[row] = tensor.data[row * tensor.width + at];
-  return column;
+  const made = columns.get(tensor) ?? new Map();
+  columns.set(tensor, made);
+  if (!made.has(at)) {
+    const column = new Float64Array(tensor.rows);
+    for (let row = 0; row < tensor.rows; row++) column[row] = tensor.data[row * tensor.width + at];
+    made.set(at, column);
+  }
+  return made.get(at);
 }
 
 function unitOf(name, d) {

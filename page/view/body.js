@@ -192,13 +192,14 @@ export class Body {
   async fill(quantity, { low, high, isLogarithmic }, isWanted) {
     const { value, deviation } = this.geometry.attributes;
     const [from, to] = [low, high].map((end) => levelOf(end, isLogarithmic));
+    const { values, deviations } = quantity ?? {};
     await inTurns(this.arrangement.n, (first, end) => {
       if (!isWanted()) return;
       for (let place = first; place < end; place++) {
         const point = this.pointAt(place);
         // Relative to the range, since these have 32 bits. What is not known has numbers of its own.
-        const share = quantity ? (levelOf(quantity.values[point], isLogarithmic) - from) / (to - from) : 0;
-        const off = quantity?.deviations ? quantity.deviations[point] : 0;
+        const share = values ? (levelOf(values[point], isLogarithmic) - from) / (to - from) : 0;
+        const off = deviations ? deviations[point] : 0;
         value.array[place] = Number.isNaN(share) ? UNKNOWN : share;
         deviation.array[place] = Number.isFinite(off) ? off : -UNKNOWN;
       }

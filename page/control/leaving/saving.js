@@ -81,13 +81,14 @@ async function coloursOf(n, quantity) {
   const support = page.settings.colour === "support" ? page.answer?.fields.support : undefined;
   const range = rangeNow(quantity);
   const { data, width, height } = textureOf(range);
+  const { values, deviations } = quantity ?? {};
   await inTurns(n, (from, to) => {
     for (let row = from; row < to; row++) {
       if (support) colours.set(bytesOf(SUPPORT[support[row]]), 3 * row);
       else if (quantity?.channels) for (let of = 0; of < 3; of++) colours[3 * row + of] = quantity.channels[of][row];
       else {
-        const share = quantity ? shareOf(quantity.values[row], range) : NaN;
-        const off = range.full > 0 ? (quantity?.deviations?.[row] ?? 0) / range.full : 0;
+        const share = values ? shareOf(values[row], range) : NaN;
+        const off = range.full > 0 ? (deviations?.[row] ?? 0) / range.full : 0;
         const level = Math.min(Math.floor(Math.min(off, 1) * height), height - 1);
         const at = 4 * (level * width + Math.round(Math.min(Math.max(share, 0), 1) * (width - 1)));
         if (Number.isNaN(share)) colours.set(PLAIN, 3 * row);
