@@ -116,7 +116,7 @@ pub struct FitArguments {
     /// The function whose level set is the surface.
     #[arg(long, value_enum)]
     pub surface: Option<SurfaceModelChoice>,
-    /// What becomes of points that coincide, where alpha is 0.
+    /// The treatment of points that coincide, where alpha is 0.
     #[arg(long, value_enum)]
     pub duplicates: Option<DuplicatePolicy>,
     /// Further members of the request as JSON, such as '{"orientation": "gradient"}'.

@@ -25,7 +25,7 @@ pub use command::FileCommand;
 use command::{Ask, Files};
 use failure::Failure;
 use gramian_host::process::signals::Signals;
-use places::{Asked, Task, bytes_in, is_standard, shown};
+use places::{FileArguments, Task, bytes_in, is_standard, shown};
 use read::FileCloud;
 use request::CloudRequest;
 use router::Answerer;
@@ -76,31 +76,31 @@ async fn answer(command: FileCommand, config: Config) -> Result<(), Failure> {
         FileCommand::Curvatures(of) => (of, "curvatures"),
         FileCommand::Mesh(of) => {
             let request = CloudRequest::of_mesh(&of)?;
-            let asked = asked(&of.files, Content::Mesh, "mesh");
-            let asked = Asked { output: of.output.as_deref(), to: of.to.as_deref(), ..asked };
-            return answer_clouds(asked, &of.files, &request, config).await;
+            let arguments = file_arguments(&of.files, Content::Mesh, "mesh");
+            let arguments = FileArguments { output: of.output.as_deref(), to: of.to.as_deref(), ..arguments };
+            return answer_clouds(arguments, &of.files, &request, config).await;
         }
         FileCommand::Ask(ask) => return answer_request(ask, config).await,
     };
     let request = CloudRequest::of_points(operation, &of.fit)?;
-    let asked = asked(&of.files, Content::Points, operation);
-    let asked = Asked { output: of.output.as_deref(), to: of.to.as_deref(), ..asked };
-    answer_clouds(asked, &of.files, &request, config).await
+    let arguments = file_arguments(&of.files, Content::Points, operation);
+    let arguments = FileArguments { output: of.output.as_deref(), to: of.to.as_deref(), ..arguments };
+    answer_clouds(arguments, &of.files, &request, config).await
 }
 
-fn asked<'a>(files: &'a Files, content: Content, suffix: &'a str) -> Asked<'a> {
+fn file_arguments<'a>(files: &'a Files, content: Content, suffix: &'a str) -> FileArguments<'a> {
     let is_forced = files.manners.force;
-    Asked { inputs: &files.clouds, output: None, to: None, content, suffix, is_forced }
+    FileArguments { inputs: &files.clouds, output: None, to: None, content, suffix, is_forced }
 }
 
 /// Answers one cloud after another. A cloud that fails does not keep the others from their answers.
 async fn answer_clouds(
-    asked: Asked<'_>,
+    arguments: FileArguments<'_>,
     files: &Files,
     request: &CloudRequest,
     config: Config,
 ) -> Result<(), Failure> {
-    let tasks = asked.tasks()?;
+    let tasks = arguments.tasks()?;
     let answerer = Answerer::start(config, files.manners.quiet).await?;
     let mut last = Ok(());
     for task in tasks {
@@ -147,7 +147,7 @@ async fn answer_cloud(
 async fn answer_request(ask: Ask, config: Config) -> Result<(), Failure> {
     let Ask { operation, request, output, manners } = ask;
     let inputs = [request];
-    let asked = Asked {
+    let arguments = FileArguments {
         inputs: &inputs,
         output: Some(output.as_deref().unwrap_or(Path::new("-"))),
         to: output.as_deref().is_none_or(is_standard).then_some("json"),
@@ -155,7 +155,7 @@ async fn answer_request(ask: Ask, config: Config) -> Result<(), Failure> {
         suffix: "answer",
         is_forced: manners.force,
     };
-    for Task { input, output, format } in asked.tasks()? {
+    for Task { input, output, format } in arguments.tasks()? {
         let (name, place) = (shown(&input), output.name());
         let is_file = !matches!(output, output::Output::Standard);
         let body = on_thread(move || bytes_in(&input)).await?;

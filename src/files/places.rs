@@ -21,8 +21,8 @@ pub struct Task {
     pub format: &'static Format,
 }
 
-/// What a command line says about its files.
-pub struct Asked<'a> {
+/// Input files and the place of their answers, from a command line.
+pub struct FileArguments<'a> {
     pub inputs: &'a [PathBuf],
     pub output: Option<&'a Path>,
     /// The ending of answers, where their names do not tell it.
@@ -33,7 +33,7 @@ pub struct Asked<'a> {
     pub is_forced: bool,
 }
 
-impl Asked<'_> {
+impl FileArguments<'_> {
     /// Finds a place for each answer, and makes sure that it can be written.
     ///
     /// # Errors

@@ -19,7 +19,7 @@ const COLOURS = [
  * @typedef {{ columns: Map<string, Float64Array>, lines?: number[], record?: string }} Rows
  */
 
-/** What happens to rows without a position. */
+/** The treatment of rows without a position. */
 export const GAPS = /** @type {const} */ ({ refused: "refused", leftOut: "leftOut", kept: "kept" });
 
 /**

@@ -36,7 +36,7 @@ function rowsOf(body, { fields, numbers, nPoints, encoding, nLines }) {
   throw new Error(`DATA is "${encoding}", not ascii, binary or binary_compressed`);
 }
 
-/** What the first lines say. */
+/** The header: fields, number of points and encoding. */
 function headerOf(bytes) {
   const text = latin(bytes.subarray(0, MAX_HEADER_BYTES));
   const entries = new Map();

@@ -23,11 +23,11 @@ pub struct Columns {
 pub enum Places {
     /// In lines of these numbers.
     Lines(Vec<usize>),
-    /// One after another, each called so.
+    /// One after another. Refusals have this name of a record.
     Records(&'static str),
 }
 
-/// What happens to rows without a position.
+/// The treatment of rows without a position.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Gaps {
     Refused,

@@ -13,12 +13,12 @@ pub enum Format {
     Json,
 }
 
-/// What there is to know about a format before a file is opened.
+/// Name and endings of a format, with a summary of its reader.
 pub struct Description {
     pub format: Format,
     pub name: &'static str,
     pub endings: &'static [&'static str],
-    /// What is read, and what is not.
+    /// Contents that are read, and those that are skipped.
     pub reads: &'static str,
 }
 

@@ -35,7 +35,7 @@ pub fn read(bytes: &[u8]) -> Result<FileCloud, String> {
     with_colours(columns, &header).into_cloud(Gaps::LeftOut)
 }
 
-/// What the first lines say.
+/// The header: fields, number of points and encoding.
 struct Header<'a> {
     fields: Vec<PcdField<'a>>,
     n_points: usize,

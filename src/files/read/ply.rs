@@ -45,7 +45,7 @@ fn vertices(mut cursor: Cursor<'_>, header: &Header<'_>, element: &Element<'_>) 
     Ok(Columns { names, numbers, places })
 }
 
-/// The words of files for what the parser says about bodies.
+/// Translates an error of the body parser into words of files.
 fn refusal(error: PlyError) -> String {
     match error {
         PlyError::NoMagic => "the file is not PLY: its first line is not \"ply\"".to_owned(),

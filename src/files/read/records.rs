@@ -64,7 +64,7 @@ pub struct Records<'a> {
     pub bytes: &'a [u8],
     pub count: usize,
     pub width: usize,
-    /// What a record is called: "point".
+    /// Name of a record in refusals: "point".
     pub name: &'static str,
 }
 
